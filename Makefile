@@ -1,0 +1,62 @@
+# Everything runs in .venv, which is made at first use. Needed on the machine: Python >= 3.11, make, gcc.
+PYTHON  ?= python3
+# Upper limit of pytest's parallel workers; 0 runs all in one process.
+WORKERS ?= 2
+
+VENV  := .venv
+BIN   := $(VENV)/bin
+STAMP := $(VENV)/.installed
+PIP   := -m pip --disable-pip-version-check
+
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=$(WORKERS)
+ifeq ($(WORKERS),0)
+PYTEST := $(BIN)/python -m pytest -n 0
+endif
+
+export MPLBACKEND ?= Agg
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help install bench test lint docs quick constraints clean
+
+help: ## list the targets
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 14
+
+install: $(STAMP) ## make .venv, with the package in editable mode and all extras
+
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python $(PIP) install --quiet -c constraints.txt -e '.[test,docs]'
+	touch $@
+
+bench: $(STAMP) ## run the main job: all methods on the arm, a table and a picture
+	$(BIN)/python -m benchmarks bench
+
+test: lint docs ## all checks and tests
+	$(PYTEST) --cov --cov-report=term
+
+lint: $(STAMP) ## ruff, pyright, the dependency law
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/lint-imports
+
+docs: $(STAMP) ## build the documentation, strictly, into build/docs
+	$(BIN)/sphinx-build -W --keep-going -E -q -b html -d build/doctrees docs build/docs
+
+quick: $(STAMP) ## the tests that are not slow, without coverage
+	$(PYTEST) -m 'not slow'
+
+constraints: ## renew constraints.txt from the newest versions (run `make test` afterwards)
+	rm -rf build/fresh
+	$(PYTHON) -m venv build/fresh
+	build/fresh/bin/python $(PIP) install --quiet -e '.[test,docs]'
+	sed -n '/^#/p' constraints.txt > build/constraints.txt
+	build/fresh/bin/python $(PIP) list --format=freeze --exclude-editable \
+		--exclude pip --exclude setuptools >> build/constraints.txt
+	mv build/constraints.txt constraints.txt
+	rm -rf build/fresh
+
+clean: ## remove .venv and everything that was built
+	rm -rf $(VENV) build dist .coverage .coverage.* .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
