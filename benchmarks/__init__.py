@@ -1,0 +1,1 @@
+"""The suites that compare solvers: ``python -m benchmarks``."""

@@ -1,0 +1,1 @@
+"""Robots, obstacles, tasks and textbook problems, each as symbolic models."""

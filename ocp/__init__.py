@@ -1,0 +1,52 @@
+"""What an optimal control problem is, and what is true of it whoever solves it."""
+
+from ocp.constraint import Box, Constraint
+from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
+from ocp.evaluate import Evaluation, costates_along, evaluate
+from ocp.functions import Functions
+from ocp.guess import Guess
+from ocp.integrate import RK4, Euler, Integrator, Midpoint, Stage
+from ocp.model import Model
+from ocp.optimality import Optimality, derive
+from ocp.parameters import Parameter, ParameterValues, Signal
+from ocp.problem import OCP, FreeTime
+from ocp.solution import Solution, Work
+from ocp.solver import Program, Solver, Start, solve
+from ocp.status import Status
+from ocp.transcription import Data, Transcription
+
+__all__ = [
+    "OCP",
+    "RK4",
+    "Box",
+    "Constraint",
+    "Data",
+    "Euler",
+    "Evaluation",
+    "FreeTime",
+    "Functions",
+    "Guess",
+    "Integrator",
+    "Midpoint",
+    "Model",
+    "OCPError",
+    "Optimality",
+    "Parameter",
+    "ParameterValues",
+    "ProblemError",
+    "Program",
+    "Signal",
+    "Solution",
+    "Solver",
+    "SolverError",
+    "Stage",
+    "Start",
+    "Status",
+    "Transcription",
+    "UnsupportedProblem",
+    "Work",
+    "costates_along",
+    "derive",
+    "evaluate",
+    "solve",
+]

@@ -1,0 +1,96 @@
+"""Bounds and constraints, each with a name a message can use."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.errors import ProblemError
+from ocp.expressions import column, numbers
+
+Place = Literal["path", "initial", "terminal"]
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Simple bounds ``lower <= v <= upper``; a number holds for every component.
+
+    Args:
+        lower: lower bound, a number or (n,); ``-inf``: none.
+        upper: upper bound, a number or (n,); ``inf``: none.
+    """
+
+    lower: ArrayLike = -np.inf
+    upper: ArrayLike = np.inf
+
+    def sized(self, size: int, what: str) -> "Box":
+        """Return the box with bounds of shape (size,), checked."""
+        lower = numbers(self.lower, size, f"{what}: lower", finite=False)
+        upper = numbers(self.upper, size, f"{what}: upper", finite=False)
+        wrong = np.flatnonzero((lower > upper) | (lower == np.inf) | (upper == -np.inf))
+        if wrong.size:
+            i = int(wrong[0])
+            raise ProblemError(f"{what}[{i}]: no number lies between {lower[i]} and {upper[i]}")
+        return Box(lower, upper)
+
+    @property
+    def is_active(self) -> bool:
+        """Whether any component is bounded at all."""
+        return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+    def clip(self, value: np.ndarray) -> np.ndarray:
+        """Return the nearest point of the box, along the last axis."""
+        return np.clip(value, np.asarray(self.lower, float), np.asarray(self.upper, float))
+
+    def excess(self, value: np.ndarray) -> np.ndarray:
+        """Return by how much each component lies outside, 0 inside."""
+        below = np.asarray(self.lower, float) - value
+        above = value - np.asarray(self.upper, float)
+        return np.maximum(0.0, np.maximum(below, above))
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """``lower <= expression <= upper`` at a place of the trajectory.
+
+    Args:
+        name: what a message calls it.
+        expression: column (m,) in x, u, t and parameters; no u unless ``at="path"``.
+        lower: number or (m,); equal to ``upper`` for an equation.
+        upper: number or (m,).
+        at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
+            manifold, and ``x0`` a guess) or ``"terminal"``.
+    """
+
+    name: str
+    expression: ca.SX
+    lower: ArrayLike = -np.inf
+    upper: ArrayLike = np.inf
+    at: Place = "path"
+
+    def __post_init__(self) -> None:
+        """Stack the expression and size the bounds."""
+        if self.at not in ("path", "initial", "terminal"):
+            raise ProblemError(f"constraint '{self.name}': at = {self.at!r} is no place")
+        expression = column(self.expression, f"constraint '{self.name}'")
+        box = Box(self.lower, self.upper).sized(expression.numel(), f"constraint '{self.name}'")
+        object.__setattr__(self, "expression", expression)
+        object.__setattr__(self, "lower", box.lower)
+        object.__setattr__(self, "upper", box.upper)
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return self.expression.numel()
+
+    @property
+    def box(self) -> Box:
+        """The bounds, each (size,)."""
+        return Box(self.lower, self.upper)
+
+    @property
+    def is_equation(self) -> bool:
+        """Whether every row is an equation."""
+        return bool(np.all(np.asarray(self.lower) == np.asarray(self.upper)))

@@ -1,0 +1,17 @@
+"""The exceptions of the toolkit: one root, three kinds."""
+
+
+class OCPError(Exception):
+    """Root of every error that the toolkit raises on purpose."""
+
+
+class ProblemError(OCPError, ValueError):
+    """A description or an input is wrong; the message names symbol, shape and stage."""
+
+
+class UnsupportedProblem(OCPError, TypeError):  # noqa: N818 - the design's name reads as a verdict
+    """A solver cannot treat this (valid) problem; the message names the term that stops it."""
+
+
+class SolverError(OCPError, RuntimeError):
+    """A solution was required (``Solution.or_raise``), but the solver did not reach one."""

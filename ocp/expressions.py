@@ -1,0 +1,80 @@
+"""Checks on CasADi expressions, in words that name what is wrong."""
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.errors import ProblemError
+
+Expression = ca.SX | ca.DM | float | int | np.ndarray | Sequence
+
+
+def require_symbols(symbols: ca.SX, what: str) -> None:
+    """Raise unless ``symbols`` is a column of distinct ``SX`` symbols."""
+    if not isinstance(symbols, ca.SX):
+        raise ProblemError(f"{what} is a {type(symbols).__name__}; write it with casadi.SX.sym")
+    if symbols.shape[1] != 1 or not symbols.is_dense() or not symbols.is_valid_input():
+        raise ProblemError(f"{what} must be a dense column of symbols, it has shape {symbols.shape}")
+    if len({element.element_hash() for element in ca.vertsplit(symbols)}) < symbols.numel():
+        raise ProblemError(f"{what} contains the same symbol twice: {', '.join(element_names(symbols))}")
+
+
+def element_names(symbols: ca.SX) -> tuple[str, ...]:
+    """Return the name of every scalar symbol in a column."""
+    return tuple(str(symbols[i]) for i in range(symbols.numel()))
+
+
+def column(expression: Expression, what: str) -> ca.SX:
+    """Return ``expression`` as a dense ``SX`` column; a list is stacked."""
+    try:
+        if isinstance(expression, list | tuple):
+            expression = ca.vertcat(*expression)
+        result = ca.SX(expression)
+    except (TypeError, ValueError, NotImplementedError) as error:
+        kind = type(expression).__name__
+        raise ProblemError(f"{what} is a {kind} that is no casadi.SX expression") from error
+    if result.shape[1] != 1 and result.shape[0] != 1:
+        raise ProblemError(f"{what} has shape {result.shape}, a column is needed")
+    return ca.densify(ca.vec(result))
+
+
+def scalar(expression: Expression, what: str) -> ca.SX:
+    """Return ``expression`` as a scalar ``SX``."""
+    result = column(expression, what)
+    if result.numel() != 1:
+        raise ProblemError(f"{what} has {result.numel()} elements, a scalar is needed")
+    return result
+
+
+def refuse_foreign_symbols(expression: ca.SX, allowed: Sequence[ca.SX], what: str) -> None:
+    """Raise ``ProblemError`` naming each symbol of ``expression`` that is not ``allowed``."""
+    known = {e.element_hash() for block in allowed for e in ca.vertsplit(ca.vec(block))}
+    foreign = [str(s) for s in ca.symvar(expression) if s.element_hash() not in known]
+    if foreign:
+        raise ProblemError(
+            f"{what} contains {', '.join(sorted(foreign))}, unknown at this place: "
+            "it must be a state, a control, t or a declared parameter "
+            "(no controls in initial or terminal terms)"
+        )
+
+
+def numbers(values: ArrayLike, size: int, what: str, *, finite: bool = True) -> np.ndarray:
+    """Return ``values`` as a read-only float vector (size,); one number is repeated.
+
+    Raises:
+        ProblemError: on a wrong size, on NaN, and on infinity where ``finite``.
+    """
+    try:
+        vector = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"{what} is not numeric: {values!r}") from error
+    vector = np.full(size, float(vector)) if vector.ndim == 0 else vector.reshape(-1).copy()
+    if vector.size != size:
+        raise ProblemError(f"{what} has {vector.size} entries, {size} are needed")
+    if np.isnan(vector).any() or (finite and not np.isfinite(vector).all()):
+        bad = int(np.flatnonzero(~np.isfinite(vector))[0])
+        raise ProblemError(f"{what}[{bad}] is {vector[bad]}, a finite number is needed")
+    vector.flags.writeable = False
+    return vector

@@ -1,0 +1,61 @@
+"""A problem as CasADi Functions: numbers in, numbers out."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from ocp.constraint import Constraint
+
+if TYPE_CHECKING:
+    from ocp.problem import OCP
+
+
+@dataclass(frozen=True, eq=False)
+class Functions:
+    """Everything a problem says, as Functions of (x, u, t, p) or, at the ends, of (x, t, p).
+
+    Attributes:
+        rate: f (nx,).
+        running_cost: L.
+        terminal_cost: phi.
+        path: path constraints, stacked.
+        initial: initial constraints, stacked.
+        terminal: terminal constraints, stacked.
+        invariants: invariants, stacked; of (x, t, p).
+    """
+
+    rate: ca.Function
+    running_cost: ca.Function
+    terminal_cost: ca.Function
+    path: ca.Function
+    initial: ca.Function
+    terminal: ca.Function
+    invariants: ca.Function
+
+    @classmethod
+    def of(cls, ocp: "OCP") -> "Functions":
+        """Build them."""
+        m, p = ocp.model, ocp.p
+
+        def along(name: str, expression: ca.SX) -> ca.Function:
+            return ca.Function(name, [m.x, m.u, m.t, p], [expression], ["x", "u", "t", "p"], [name])
+
+        def at_an_end(name: str, expression: ca.SX) -> ca.Function:
+            return ca.Function(name, [m.x, m.t, p], [expression], ["x", "t", "p"], [name])
+
+        return cls(
+            rate=along("rate", m.f),
+            running_cost=along("running_cost", ca.SX(ocp.running_cost)),
+            terminal_cost=at_an_end("terminal_cost", ca.SX(ocp.terminal_cost)),
+            path=along("path", stacked(ocp.at("path"))),
+            initial=at_an_end("initial", stacked(ocp.at("initial"))),
+            terminal=at_an_end("terminal", stacked(ocp.at("terminal"))),
+            invariants=at_an_end("invariants", stacked(ocp.invariants)),
+        )
+
+
+def stacked(constraints: Iterable[Constraint]) -> ca.SX:
+    """Return the expressions of several constraints as one column."""
+    return ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])

@@ -1,0 +1,137 @@
+"""One-step integrators, and a problem's stage: state and cost after one step."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+
+from ocp.errors import ProblemError
+
+if TYPE_CHECKING:
+    from ocp.problem import OCP
+
+Rate = Callable[[ca.SX, ca.SX], ca.SX]
+
+
+@dataclass(frozen=True)
+class Integrator(ABC):
+    """An explicit one-step method, applied ``steps`` times per interval.
+
+    Args:
+        steps: equal substeps in each interval.
+    """
+
+    steps: int = 1
+    order: ClassVar[int]
+
+    def __post_init__(self) -> None:
+        """Check the number of substeps."""
+        if self.steps < 1:
+            raise ProblemError(f"an integrator needs at least one step, not {self.steps}")
+
+    def __call__(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z(s + h) for dz/ds = rate(z, s)."""
+        substep = h / self.steps
+        for i in range(self.steps):
+            z = self.substep(rate, z, s + i * substep, substep)
+        return z
+
+    @abstractmethod
+    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z after one substep."""
+
+
+@dataclass(frozen=True)
+class Euler(Integrator):
+    """Explicit Euler, order 1: what the thesis' simulations use."""
+
+    order: ClassVar[int] = 1
+
+    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z + h rate(z, s)."""
+        return z + h * rate(z, s)
+
+
+@dataclass(frozen=True)
+class Midpoint(Integrator):
+    """Explicit midpoint rule, order 2."""
+
+    order: ClassVar[int] = 2
+
+    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z + h rate at the middle."""
+        return z + h * rate(z + h / 2 * rate(z, s), s + h / 2)
+
+
+@dataclass(frozen=True)
+class RK4(Integrator):
+    """The classical Runge-Kutta method, order 4."""
+
+    order: ClassVar[int] = 4
+
+    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z after one step with the weights 1/6, 1/3, 1/3, 1/6."""
+        k1 = rate(z, s)
+        k2 = rate(z + h / 2 * k1, s + h / 2)
+        k3 = rate(z + h / 2 * k2, s + h / 2)
+        k4 = rate(z + h * k3, s + h)
+        return z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """One step of a problem, from (x, u, t, h, p0, p1) or (x, u0, u1, t, h, p0, p1).
+
+    Controls and parameters run linearly from u0, p0 at t to u1, p1 at t + h; a held control
+    has only u. A discrete-time model takes u0, p0 and ignores h.
+
+    Attributes:
+        step: -> (x after the step, cost of the step).
+        adjoint: (..., costate after) -> (costate before, dJ/du) or (..., dJ/du0, dJ/du1), the
+            exact derivative of the *discretised* cost.
+    """
+
+    step: ca.Function
+    adjoint: ca.Function
+
+    @classmethod
+    def of(cls, ocp: "OCP", integrator: Integrator, *, held: bool) -> "Stage":
+        """Build the stage of a problem under an integrator."""
+        m, n_p = ocp.model, ocp.p.numel()
+        sizes = {"x": m.nx, "u0": m.nu, "u1": m.nu, "t": 1, "h": 1, "p0": n_p, "p1": n_p}
+        symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
+        if held:
+            del symbols["u1"]
+        after, cost = _one_step(ocp, integrator, {"u1": symbols["u0"], **symbols})
+        costate = ca.SX.sym("costate", m.nx)
+        total = cost + ca.dot(costate, after)
+        wanted = [v for name, v in symbols.items() if name in ("x", "u0", "u1")]
+        gradients = [ca.densify(ca.gradient(total, v)) for v in wanted]
+        inputs, names = list(symbols.values()), list(symbols)
+        return cls(
+            step=ca.Function("step", inputs, [after, cost], names, ["x_next", "cost"]),
+            adjoint=ca.Function("adjoint", [*inputs, costate], gradients),
+        )
+
+
+def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+    nx, functions = ocp.model.nx, ocp.functions
+    if ocp.model.is_discrete:
+        now = (s["x"], s["u0"], s["t"], s["p0"])
+        return functions.rate(*now), functions.running_cost(*now)  # type: ignore[return-value]
+
+    def rate(z: ca.SX, fraction: ca.SX) -> ca.SX:
+        """d(x, cost) over the fraction of the interval, in [0, 1]."""
+        u, p = between(s["u0"], s["u1"], fraction), between(s["p0"], s["p1"], fraction)
+        now = (z[:nx], u, s["t"] + fraction * s["h"], p)
+        return s["h"] * ca.vertcat(functions.rate(*now), functions.running_cost(*now))
+
+    end = integrator(rate, ca.vertcat(s["x"], 0), 0.0, 1.0)
+    return end[:nx], end[nx]
+
+
+def between(left: ca.SX, right: ca.SX, s: ca.SX | float) -> ca.SX:
+    """Return the linear interpolation; free of rounding where both ends are equal."""
+    return left + s * (right - left)

@@ -1,0 +1,240 @@
+"""The optimal control problem in Bolza form, written once for every solver."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.constraint import Box, Constraint
+from ocp.describe import describe
+from ocp.errors import ProblemError
+from ocp.expressions import element_names, numbers, refuse_foreign_symbols, scalar
+from ocp.functions import Functions
+from ocp.guess import Guess
+from ocp.model import Model
+from ocp.parameters import Parameter, ParameterValues, Signal
+
+
+@dataclass(frozen=True)
+class FreeTime:
+    """A final time the optimiser chooses.
+
+    Args:
+        guess: first guess of the duration [s].
+        lower: shortest duration [s]; keep it positive.
+        upper: longest duration [s].
+    """
+
+    guess: float
+    lower: float = 1e-3
+    upper: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Check the order of the three durations."""
+        if not 0.0 < self.lower <= self.guess <= self.upper:
+            raise ProblemError(
+                f"free final time: 0 < lower <= guess <= upper is needed, "
+                f"not {self.lower}, {self.guess}, {self.upper} [s]"
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OCP:
+    r"""An optimal control problem in Bolza form.
+
+    .. math::
+
+        \min \; \varphi(x(t_f), t_f) + \int_{t_0}^{t_f} L(x, u, t)\, dt
+        \quad \text{s.t.} \quad \dot x = f(x, u, t), \; x(t_0) = x_0, \; \dots
+
+    With a discrete-time model the integral is the sum of L over the steps (not multiplied
+    by dt). Source: thesis (1.5) to (1.9); notation of [Bryson & Ho 1975].
+
+    Args:
+        name: what people call it.
+        model: the dynamics.
+        x0: start (nx,); with an ``"initial"`` constraint only a guess of it.
+        horizon: duration [s], ``FreeTime``, or a number of steps for a discrete-time model.
+        running_cost: L(x, u, t, parameters).
+        terminal_cost: phi(x, t, parameters).
+        control_bounds: box around the controls.
+        state_bounds: box around the states.
+        constraints: path, initial and terminal constraints.
+        invariants: what the exact dynamics keep by themselves (the task error of a redundant
+            arm, an energy, the norm of a quaternion). No method has to impose them; the
+            referee reports how far a solution strays.
+        parameters: constants and sampled signals that may change from run to run.
+        smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
+        guess: where solvers start unless told otherwise.
+
+    Raises:
+        ProblemError: naming symbol, shape and place of what is wrong.
+    """
+
+    name: str
+    model: Model
+    x0: ArrayLike
+    horizon: float | int | FreeTime
+    running_cost: ca.SX | float = 0.0
+    terminal_cost: ca.SX | float = 0.0
+    control_bounds: Box = field(default_factory=Box)
+    state_bounds: Box = field(default_factory=Box)
+    constraints: tuple[Constraint, ...] = ()
+    invariants: tuple[Constraint, ...] = ()
+    parameters: tuple[Parameter | Signal, ...] = ()
+    smoothness: Literal[0, 1, 2] = 2
+    guess: Guess | None = None
+
+    def __post_init__(self) -> None:
+        """Check every shape, symbol and number, and stack what was given loosely."""
+        model = self.model
+        set_ = object.__setattr__
+        set_(self, "x0", numbers(self.x0, model.nx, f"{self.name}: x0"))
+        set_(self, "running_cost", scalar(self.running_cost, f"{self.name}: running_cost"))
+        set_(self, "terminal_cost", scalar(self.terminal_cost, f"{self.name}: terminal_cost"))
+        set_(self, "control_bounds", self.control_bounds.sized(model.nu, f"{self.name}: control_bounds"))
+        set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
+        self._check_names()
+        self._check_horizon()
+        self._check_symbols()
+        self._check_start()
+
+    # -- what it is ---------------------------------------------------------------
+
+    @property
+    def p(self) -> ca.SX:
+        """All parameter and signal symbols, stacked (n_p,)."""
+        return ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.parameters])
+
+    @property
+    def has_free_time(self) -> bool:
+        """Whether the final time is an unknown."""
+        return isinstance(self.horizon, FreeTime)
+
+    @property
+    def has_free_start(self) -> bool:
+        """Whether the start is only required to lie on a manifold."""
+        return any(c.at == "initial" for c in self.constraints)
+
+    @property
+    def duration(self) -> float:
+        """Final time minus t0 [s]; where it is free, its guess."""
+        if isinstance(self.horizon, FreeTime):
+            return self.horizon.guess
+        return float(self.horizon) * (self.model.dt or 1.0)
+
+    @property
+    def time_box(self) -> Box:
+        """Bounds of the duration [s]; a fixed one has equal bounds."""
+        if isinstance(self.horizon, FreeTime):
+            return Box([self.horizon.lower], [self.horizon.upper])
+        return Box([self.duration], [self.duration])
+
+    @property
+    def steps(self) -> int | None:
+        """Number of steps of a discrete-time problem, else None."""
+        return int(self.horizon) if self.model.is_discrete else None  # type: ignore[arg-type]
+
+    def at(self, place: Literal["path", "initial", "terminal"]) -> tuple[Constraint, ...]:
+        """Return the constraints of one place."""
+        return tuple(c for c in self.constraints if c.at == place)
+
+    @cached_property
+    def functions(self) -> Functions:
+        """Dynamics, costs and constraints as CasADi Functions, built at first use."""
+        return Functions.of(self)
+
+    def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
+        """Return the numbers of a run: the declared ones, replaced by those ``given``."""
+        values = ParameterValues.of(self.parameters, given)
+        for entry, value in zip(values.entries, values.values, strict=True):
+            if isinstance(entry, Signal) and self.steps and len(value) != self.steps + 1:
+                raise ProblemError(
+                    f"signal '{entry.name}' has {len(value)} samples; a discrete-time problem of "
+                    f"{self.steps} steps needs {self.steps + 1}"
+                )
+        return values
+
+    def start(self, x0: ArrayLike | None = None) -> np.ndarray:
+        """Return the start of a run (nx,), checked; the declared one unless given."""
+        start = numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
+        outside = np.flatnonzero(self.state_bounds.excess(start))
+        if outside.size and not self.has_free_start:
+            i = int(outside[0])
+            low, high = np.asarray(self.state_bounds.lower)[i], np.asarray(self.state_bounds.upper)[i]
+            raise ProblemError(
+                f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {start[i]} is outside "
+                f"its bounds [{low}, {high}]"
+            )
+        return start
+
+    def describe(self) -> str:
+        """Return the problem in mathematics, for a person."""
+        return describe(self)
+
+    # -- checks at construction -----------------------------------------------------
+
+    def _check_names(self) -> None:
+        for kind, entries in (
+            ("constraint", (*self.constraints, *self.invariants)),
+            ("parameter", self.parameters),
+        ):
+            names = [entry.name for entry in entries]
+            twice = sorted({n for n in names if names.count(n) > 1})
+            if twice:
+                raise ProblemError(f"{self.name}: two {kind}s are called '{twice[0]}'")
+
+    def _check_horizon(self) -> None:
+        if self.smoothness not in (0, 1, 2):
+            raise ProblemError(f"{self.name}: smoothness = {self.smoothness!r}, it is 0, 1 or 2")
+        if isinstance(self.horizon, FreeTime):
+            if self.model.is_discrete:
+                raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
+            return
+        if not isinstance(self.horizon, int | float) or not 0.0 < self.horizon < np.inf:
+            raise ProblemError(f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite")
+        if self.model.is_discrete and self.horizon != int(self.horizon):
+            raise ProblemError(
+                f"{self.name}: horizon = {self.horizon} of a discrete-time model is a number of steps"
+            )
+
+    def _check_symbols(self) -> None:
+        model, p = self.model, self.p
+        declared = element_names(ca.vertcat(model.x, model.u, model.t, p))
+        hashes = {e.element_hash() for e in ca.vertsplit(ca.vertcat(model.x, model.u, model.t, p))}
+        if len(hashes) < len(declared):
+            raise ProblemError(f"{self.name}: a symbol is declared twice among x, u, t and parameters")
+        model.refuse_foreign_symbols(p)
+        everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
+        refuse_foreign_symbols(self.running_cost, everywhere, f"{self.name}: running_cost")  # type: ignore[arg-type]
+        refuse_foreign_symbols(self.terminal_cost, at_ends, f"{self.name}: terminal_cost")  # type: ignore[arg-type]
+        for c in self.constraints:
+            allowed = everywhere if c.at == "path" else at_ends
+            refuse_foreign_symbols(c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'")
+        for c in self.invariants:
+            refuse_foreign_symbols(c.expression, at_ends, f"{self.name}: invariant '{c.name}'")
+            if c.at != "path":
+                raise ProblemError(f"{self.name}: invariant '{c.name}' must hold at='path'")
+
+    def _check_start(self) -> None:
+        """Evaluate everything once at the start: NaN in data or a singular start shows here."""
+        self.start()
+        p = self.parameter_values().at(0.0)[0]
+        u = self.control_bounds.clip(np.zeros(self.model.nu))
+        functions = self.functions
+        for what, value in (
+            ("dynamics f", functions.rate(self.x0, u, 0.0, p)),
+            ("running_cost", functions.running_cost(self.x0, u, 0.0, p)),
+            ("terminal_cost", functions.terminal_cost(self.x0, 0.0, p)),
+            ("constraints", functions.path(self.x0, u, 0.0, p)),
+        ):
+            row = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
+            if row.size:
+                raise ProblemError(
+                    f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {self.x0}, u = {u}: "
+                    "a singular start, or NaN in the data"
+                )

@@ -1,0 +1,224 @@
+"""What a solver returns: a trajectory, its costates, and how it was found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.errors import ProblemError, SolverError
+from ocp.optimality import derive
+from ocp.problem import OCP
+from ocp.status import Status
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ControlKind = Literal["held", "linear", "extremal"]
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a method did, free of the machine it ran on.
+
+    Attributes:
+        rollouts: integrations of the whole trajectory (states, or states and costates).
+        jacobians: evaluations of the first derivatives along the whole trajectory.
+        factorisations: linear systems factorised.
+    """
+
+    rollouts: int = 0
+    jacobians: int = 0
+    factorisations: int = 0
+
+    def __add__(self, other: "Work") -> "Work":
+        """Return the work of both."""
+        return Work(*[getattr(self, f.name) + getattr(other, f.name) for f in fields(self)])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution:
+    """A trajectory with its costates. Arrays are (N + 1, n): one row per instant.
+
+    Attributes:
+        problem: what was solved.
+        solver: the solver, as text.
+        status: how the solve ended.
+        message: what and where, where the status alone does not say it.
+        t: nodes [s], (N + 1,).
+        x: states, (N + 1, nx).
+        x0: the start that was asked for, (nx,); a guess of it where the start is free.
+        costate: dJ*/dx at the nodes, (N + 1, nx); where a state bound is active the costate
+            jumps, and the value just before the node is kept.
+        u: controls, (N, nu) where held, else (N + 1, nu).
+        control_kind: ``"held"`` between nodes, ``"linear"``, or ``"extremal"``: the
+            control minimising the Hamiltonian along state and costate.
+        cost: what the solver believes; only ``evaluate`` says what it is.
+        residual: the solver's own measure of optimality (its unit is the solver's).
+        iterations: iterations of the outer method.
+        work: integrations, Jacobians and factorisations.
+        history: cost and residual per iteration, as far as the method has them.
+        parameters: parameter values and signals of this run, by name.
+        build_time: time of ``build`` [s].
+        solve_time: time of ``run`` [s].
+    """
+
+    problem: OCP
+    solver: str
+    status: Status
+    message: str = ""
+    t: np.ndarray
+    x: np.ndarray
+    x0: np.ndarray
+    costate: np.ndarray
+    u: np.ndarray
+    control_kind: ControlKind = "held"
+    cost: float
+    residual: float = 0.0
+    iterations: int = 0
+    work: Work = field(default_factory=Work)
+    history: Mapping[str, np.ndarray] = field(default_factory=dict)
+    parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    build_time: float = 0.0
+    solve_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check shapes, and that no number is NaN."""
+        n, m = len(self.t), self.problem.model
+        rows = n - 1 if self.control_kind == "held" else n
+        for name, shape in (
+            ("x", (n, m.nx)),
+            ("x0", (m.nx,)),
+            ("costate", (n, m.nx)),
+            ("u", (rows, m.nu)),
+        ):
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise ProblemError(f"solution: {name} has shape {array.shape}, {shape} is needed")
+            if not np.isfinite(array).all():
+                raise ProblemError(f"solution: {name} is not finite")
+
+    @property
+    def duration(self) -> float:
+        """Final time minus t0 [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """The nodes as fractions of the horizon, from 0 to 1."""
+        return (self.t - self.t[0]) / self.duration
+
+    def or_raise(self) -> "Solution":
+        """Return self, or raise ``SolverError`` with the reason if the solve failed."""
+        if not self.status.is_success:
+            raise SolverError(f"{self.solver}: {self.status.value}. {self.message}".strip())
+        return self
+
+    def with_(self, **changes: object) -> "Solution":
+        """Return a copy with some fields replaced."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    # -- between the nodes ----------------------------------------------------------
+
+    def state(self, t: ArrayLike) -> np.ndarray:
+        """Return the state at time(s) t [s], (nx,) or (len(t), nx), interpolated linearly."""
+        return _interpolate(t, self.t, self.x)
+
+    def costate_at(self, t: ArrayLike) -> np.ndarray:
+        """Return the costate at time(s) t [s], interpolated linearly."""
+        return _interpolate(t, self.t, self.costate)
+
+    def control(self, t: ArrayLike) -> np.ndarray:
+        """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says."""
+        times = np.asarray(t, dtype=float)
+        if self.control_kind == "held":
+            index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
+            return self.u[np.clip(index, 0, len(self.u) - 1)]
+        if self.control_kind == "linear":
+            return _interpolate(times, self.t, self.u)
+        points = np.atleast_1d(times)
+        tau = (points - self.t[0]) / self.duration
+        p = self.problem.parameter_values(self.parameters).at(tau)
+        law = derive(self.problem).control
+        args = (self.state(points), self.costate_at(points), points[:, None], p)
+        values = np.array(law.map(len(points))(*[a.T for a in args])).T
+        return values if times.ndim else values[0]
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        """Return x, u or costate at fractions of the horizon: a solution is also a guess."""
+        times = self.t[0] + np.asarray(fractions) * self.duration
+        values = {"x": self.state, "u": self.control, "costate": self.costate_at}[part](times)
+        if values.shape[1] != width:
+            raise ProblemError(f"guess: the solution has {values.shape[1]} of {part}, {width} are needed")
+        return values
+
+    # -- to look at, to keep --------------------------------------------------------
+
+    def plot(self) -> "Figure":
+        """Return a figure of states, controls, costates and constraints over time."""
+        from ocp.plot import plot_solution  # matplotlib takes a second: only who plots waits
+
+        return plot_solution(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write everything but the problem to one ``.npz`` file and return its path."""
+        path = Path(path).with_suffix(".npz")
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        scalars = {name: getattr(self, name) for name in _SCALARS}
+        nested = {
+            f"{group}/{key}": value
+            for group in ("history", "parameters")
+            for key, value in getattr(self, group).items()
+        }
+        work = {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
+        identity = {"status": self.status.name, "problem": self.problem.name}
+        np.savez_compressed(path, **arrays, **scalars, **nested, **work, **identity)
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path, problem: OCP) -> "Solution":
+        """Read a solution of ``problem`` from a file that ``save`` wrote.
+
+        Raises:
+            ProblemError: if the file belongs to another problem or is no solution.
+        """
+        with np.load(path) as file:
+            data = {name: file[name] for name in file.files}
+        missing = {"status", "problem", *_ARRAYS, *_SCALARS} - set(data)
+        if missing:
+            raise ProblemError(f"{path} is no saved solution: {', '.join(sorted(missing))} missing")
+        if str(data["problem"]) != problem.name:
+            raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
+        groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}}
+        for name, value in data.items():
+            group, _, key = name.partition("/")
+            if key:
+                groups[group][key] = value
+        return cls(
+            problem=problem,
+            status=Status[str(data["status"])],
+            **{name: data[name] for name in _ARRAYS},
+            **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            history=groups["history"],
+            parameters=groups["parameters"],
+            work=Work(**{k: int(v) for k, v in groups["work"].items()}),
+        )
+
+
+_ARRAYS = ("t", "x", "x0", "costate", "u")
+_SCALARS = {
+    "solver": str,
+    "message": str,
+    "control_kind": str,
+    "cost": float,
+    "residual": float,
+    "iterations": int,
+    "build_time": float,
+    "solve_time": float,
+}
+
+
+def _interpolate(t: ArrayLike, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(t, nodes, c) for c in rows.T], axis=-1)

@@ -1,0 +1,62 @@
+"""What every solver promises: build once, run often."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from time import perf_counter
+
+from numpy.typing import ArrayLike
+
+from ocp.guess import Guess
+from ocp.problem import OCP
+from ocp.solution import Solution
+
+Start = Guess | Solution
+
+
+class Program(ABC):
+    """A problem prepared by a solver: all symbolic work is done."""
+
+    @abstractmethod
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve for these data.
+
+        Args:
+            x0: start (nx,), a guess of it where the start is free; default: the problem's.
+            t0: initial time [s].
+            parameters: values of parameters and samples of signals that differ from the
+                declared ones, by name.
+            guess: a ``Solution`` of any solver, or a ``Guess``; default: the problem's.
+
+        Returns:
+            a solution whose ``status`` says how it ended; failure is no exception.
+
+        Raises:
+            ProblemError: if the data do not fit the problem.
+        """
+
+
+class Solver(ABC):
+    """A method with its options: a frozen dataclass whose fields are typed."""
+
+    @abstractmethod
+    def build(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem.
+
+        Raises:
+            UnsupportedProblem: naming the term that this method cannot treat.
+        """
+
+
+def solve(ocp: OCP, solver: Solver, *, guess: Start | None = None) -> Solution:
+    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed."""
+    start = perf_counter()
+    program = solver.build(ocp)
+    build_time = perf_counter() - start
+    return program.run(guess=guess).with_(build_time=build_time)

@@ -1,0 +1,248 @@
+"""A problem on a grid as a nonlinear program, shared by the direct solvers."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+
+from ocp.constraint import Constraint
+from ocp.functions import stacked
+from ocp.integrate import Integrator, Stage
+from ocp.parameters import ParameterValues
+from ocp.problem import OCP
+
+
+@dataclass(frozen=True)
+class Data:
+    """The numbers of one run.
+
+    Attributes:
+        x0: start (nx,), or a guess of it.
+        t0: initial time [s].
+        values: parameters and signals.
+    """
+
+    x0: np.ndarray
+    t0: float
+    values: ParameterValues
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one row of the constraints says, for messages and bounds."""
+
+    name: str
+    place: Literal["dynamics", "time", "path", "initial", "terminal"]
+    node: int
+    lower: float
+    upper: float
+
+    @property
+    def is_equation(self) -> bool:
+        """Whether the row is an equation."""
+        return self.lower == self.upper
+
+
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    r"""Multiple shooting: states at nodes, controls held, integration in between.
+
+    .. math:: x_{k+1} - F(x_k, u_k) = 0, \quad k = 0 \dots N-1
+
+    Unknowns are ordered (z_0, u_0, z_1, u_1, ..., z_N), constraints stage by stage, so that
+    both a general sparse and a stagewise solver see their structure. A free final time is a
+    state T of z with T_{k+1} = T_k. Path constraints hold at the nodes; what the start alone
+    decides is not imposed there. The stage is built once and mapped.
+
+    Attributes:
+        ocp: the problem.
+        intervals: number of intervals N; a discrete-time problem brings its own.
+        integrator: one-step method of each interval.
+        keep: largest accepted violation of the problem's invariants at the nodes, imposed
+            where it is finite: an optimiser under hard constraints otherwise exploits the
+            integrator's error to leave them.
+    """
+
+    ocp: OCP
+    intervals: int
+    integrator: Integrator
+    keep: float = np.inf
+
+    # -- layout -----------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of intervals."""
+        return self.ocp.steps or self.intervals
+
+    @property
+    def nz(self) -> int:
+        """States per node, the free final time included."""
+        return self.ocp.model.nx + int(self.ocp.has_free_time)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.n * (self.nz + self.ocp.model.nu) + self.nz
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Nodes as fractions of the horizon, (N + 1,)."""
+        return np.linspace(0.0, 1.0, self.n + 1)
+
+    def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
+        return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])
+
+    def split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return z (N + 1, nz) and u (N, nu) of a vector of unknowns."""
+        stages = w[: -self.nz].reshape(self.n, -1)
+        return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
+
+    # -- the program --------------------------------------------------------------------
+
+    @cached_property
+    def program(self) -> dict[str, ca.MX]:
+        """Unknowns x, cost f, constraints g and data p, as ``casadi.nlpsol`` takes them."""
+        ocp, nx, nu, n_p, n = self.ocp, self.ocp.model.nx, self.ocp.model.nu, self.ocp.p.numel(), self.n
+        w = ca.MX.sym("w", self.size)
+        data = ca.MX.sym("data", 1 + n_p * (2 * n + 1))
+        t0 = data[0]
+        p_left = ca.reshape(data[1 : 1 + n_p * n], n_p, n)
+        p_right = ca.reshape(data[1 + n_p * n : 1 + 2 * n_p * n], n_p, n)
+        p_final = data[1 + 2 * n_p * n :]
+        stages = ca.reshape(w[: -self.nz], self.nz + nu, n)
+        z = ca.horzcat(stages[: self.nz, :], w[-self.nz :])
+        x, u = z[:nx, :], stages[self.nz :, :]
+        duration = z[nx, :-1] if ocp.has_free_time else ca.DM(np.full((1, n), ocp.duration))
+        h = duration / n
+        t = t0 + h * ca.DM(np.arange(n)).T
+        t_final = t0 + (z[nx, -1] if ocp.has_free_time else ocp.duration)
+        after, costs = Stage.of(ocp, self.integrator, held=True).step.map(n)(
+            x[:, :-1], u, t, h, p_left, p_right
+        )
+        if ocp.has_free_time:
+            after = ca.vertcat(after, duration)
+        inside = self._inside.map(n)(x[:, :-1], u, t, p_left)
+        first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
+        by_stage = ca.vertcat(z[:, 1:] - after, inside)
+        g = ca.vertcat(
+            by_stage[:, 0], first, ca.vec(by_stage[:, 1:]), self._last(x[:, -1], t_final, p_final)
+        )
+        f = ca.sum2(costs) + ocp.functions.terminal_cost(x[:, -1], t_final, p_final)
+        return {"x": w, "f": f, "g": g, "p": data}
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """What each row of g says, in order."""
+        ocp = self.ocp
+        gap = [Row(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0) for name in ocp.model.x_names]
+        gap += [Row("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
+        path = _rows(ocp.at("path"), "path") + _rows(ocp.invariants, "path", self.keep) * self._keeps
+        on_control = self._depends_on_control
+        rows: list[Row] = []
+        for k in range(self.n):
+            rows += [replace(row, node=k + 1) for row in gap]
+            decided = k == 0 and not ocp.has_free_start
+            for row, depends in zip(path, on_control, strict=True):
+                free = {"lower": -np.inf, "upper": np.inf} if decided and not depends else {}
+                rows.append(replace(row, node=k, **free))
+            if k == 0:
+                rows += _rows(ocp.at("initial"), "initial")
+        last = [row for row, depends in zip(path, on_control, strict=True) if not depends]
+        rows += [replace(row, node=self.n) for row in last + _rows(ocp.at("terminal"), "terminal")]
+        return tuple(rows)
+
+    def bounds(self, data: Data) -> dict[str, np.ndarray]:
+        """Return lbx, ubx, lbg, ubg for a start."""
+        ocp, nu = self.ocp, self.ocp.model.nu
+        state, time, control = ocp.state_bounds, ocp.time_box, ocp.control_bounds
+        result = {}
+        for key, side in (("lbx", "lower"), ("ubx", "upper")):
+            z = np.tile(np.asarray(getattr(state, side)), (self.n + 1, 1))
+            if not ocp.has_free_start:
+                z[0] = data.x0
+            if ocp.has_free_time:
+                z = np.hstack([z, np.full((self.n + 1, 1), np.asarray(getattr(time, side))[0])])
+            u = np.tile(np.asarray(getattr(control, side)).reshape(nu), (self.n, 1))
+            result[key] = self.join(z, u)
+        result["lbg"] = np.array([r.lower for r in self.rows])
+        result["ubg"] = np.array([r.upper for r in self.rows])
+        return result
+
+    def data_vector(self, data: Data) -> np.ndarray:
+        """Return the numbers of the program's p."""
+        left, right = data.values.on(self.fractions)
+        return np.concatenate([[data.t0], left.ravel(), right.ravel(), data.values.at(1.0)[0]])
+
+    def worst(self, g: np.ndarray, bounds: dict[str, np.ndarray]) -> tuple[float, Row | None]:
+        """Return the largest violation among the rows of g, and which row it is."""
+        excess = np.maximum(0.0, np.maximum(bounds["lbg"] - g, g - bounds["ubg"]))
+        if not excess.size or not excess.any():
+            return 0.0, None
+        return float(excess.max()), self.rows[int(excess.argmax())]
+
+    # -- costates -----------------------------------------------------------------------
+
+    def costates(self, w: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray, data: Data) -> np.ndarray:
+        """Return dJ*/dx at the nodes, (N + 1, nx), from the multipliers.
+
+        At nodes 1..N minus the multiplier of the gap; at node 0 what balances the start.
+        """
+        nx, initial = self.ocp.model.nx, self.ocp.at("initial")
+        later = -lam_g[self._at("dynamics")].reshape(self.n, nx)
+        first = -lam_x[:nx]
+        if initial:
+            jacobian = ca.Function(
+                "c_x", [self.ocp.model.x, self.ocp.model.t, self.ocp.p],
+                [ca.jacobian(stacked(initial), self.ocp.model.x)],
+            )
+            p = data.values.at(0.0)[0]
+            first = first - np.array(jacobian(w[:nx], data.t0, p)).T @ lam_g[self._at("initial")]
+        return np.vstack([first, later])
+
+    # -- pieces ---------------------------------------------------------------------------
+
+    def _at(self, place: str) -> np.ndarray:
+        return np.array([row.place == place for row in self.rows])
+
+    @property
+    def _keeps(self) -> bool:
+        return bool(self.ocp.invariants) and np.isfinite(self.keep)
+
+    @cached_property
+    def _path(self) -> ca.SX:
+        kept = self.ocp.invariants if self._keeps else ()
+        return stacked((*self.ocp.at("path"), *kept))
+
+    @cached_property
+    def _depends_on_control(self) -> tuple[bool, ...]:
+        jacobian = ca.jacobian(self._path, self.ocp.model.u)
+        return tuple(jacobian[i, :].nnz() > 0 for i in range(self._path.numel()))
+
+    @cached_property
+    def _inside(self) -> ca.Function:
+        m = self.ocp.model
+        return ca.Function("inside", [m.x, m.u, m.t, self.ocp.p], [self._path])
+
+    @cached_property
+    def _last(self) -> ca.Function:
+        m = self.ocp.model
+        rows = [self._path[i] for i, on_control in enumerate(self._depends_on_control) if not on_control]
+        terminal = stacked(self.ocp.at("terminal"))
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [ca.vertcat(ca.SX(0, 1), *rows, terminal)])
+
+
+def _rows(
+    constraints: tuple[Constraint, ...],
+    place: Literal["path", "initial", "terminal"],
+    slack: float = 0.0,
+) -> list[Row]:
+    """Rows of constraints at node 0, their bounds widened by ``slack``."""
+    return [
+        Row(c.name, place, 0, float(low) - slack, float(high) + slack)
+        for c in constraints
+        for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
+    ]
