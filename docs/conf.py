@@ -41,6 +41,7 @@ def to_mathml(latex: str, display: str, node: nodes.Node) -> str:
     The converter passes an unknown macro, and an alignment mark outside of an environment, on to
     the page as text. Here that is a warning, which the strict build turns into an error.
     """
+    latex = re.sub(r"\\arg(?![a-z])", r"\\operatorname{arg}", latex)
     latex = re.sub(r"\b(begin|end)\{(aligned|split)\}", r"\1{align*}", latex)
     if display == "block" and r"\begin" not in latex and re.search(r"\\\\|(?<!\\)&", latex):
         latex = rf"\begin{{align*}}{latex}\end{{align*}}"
