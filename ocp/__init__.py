@@ -1,19 +1,21 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
 from ocp.constraint import Box, Constraint
+from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.evaluate import Evaluation, costates_along, evaluate
 from ocp.functions import Functions
 from ocp.guess import Guess
-from ocp.integrate import RK4, Euler, Integrator, Midpoint, Stage
+from ocp.hamiltonian import Hamiltonian, hamiltonian
+from ocp.integrate import RK4, Euler, Integrator, Midpoint, Stage, interpolate
 from ocp.model import Model
-from ocp.optimality import Optimality, derive
+from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
 from ocp.problem import OCP, FreeTime
 from ocp.solution import Solution, Work
 from ocp.solver import Program, Solver, Start, solve
 from ocp.status import Status
-from ocp.transcription import Data, Transcription
+from ocp.transcription import Transcription
 
 __all__ = [
     "OCP",
@@ -26,6 +28,7 @@ __all__ = [
     "FreeTime",
     "Functions",
     "Guess",
+    "Hamiltonian",
     "Integrator",
     "Midpoint",
     "Model",
@@ -48,5 +51,8 @@ __all__ = [
     "costates_along",
     "derive",
     "evaluate",
+    "hamiltonian",
+    "interpolate",
     "solve",
+    "symbol_kind",
 ]

@@ -26,7 +26,11 @@ def _lines(ocp: "OCP") -> Iterable[str]:
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
     yield f"{ocp.name}   ({m.name}: {m.nx} states, {m.nu} controls)"
     yield ""
-    stage = f"sum k=0..{int(ocp.duration / (m.dt or 1)) - 1:d} of L" if discrete else f"int 0..{tf} L dt"
+    stage = (
+        f"sum k=0..{int(ocp.duration / (m.dt or 1)) - 1:d} of L"
+        if discrete
+        else f"int 0..{tf} L dt"
+    )
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
     yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
     yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp.constraint import Box, Constraint
 from ocp.functions import stacked
-from ocp.optimality import derive
+from ocp.hamiltonian import hamiltonian
 from ocp.problem import OCP
 from ocp.solution import Solution
 from ocp.truth import Truth, adjoint, follow
@@ -59,8 +59,14 @@ def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
     truth = follow(solution, tolerance=tolerance)
     if not truth.is_finite:
         return Evaluation(
-            cost=np.inf, cost_error=np.inf, violation=np.inf, worst="the state blows up",
-            stationarity=None, task_drift=np.inf, defect=np.inf, truth=truth,
+            cost=np.inf,
+            cost_error=np.inf,
+            violation=np.inf,
+            worst="the state blows up",
+            stationarity=None,
+            task_drift=np.inf,
+            defect=np.inf,
+            truth=truth,
         )
     violations = list(_violations(solution, truth))
     worst, violation = max(violations, key=lambda item: item[1], default=("none", 0.0))
@@ -176,7 +182,10 @@ def _path_is_active(solution: Solution, truth: Truth) -> bool:
     for c in ocp.at("path"):
         boxes += [(c.box, values) for values, _ in _path_values(ocp, c, truth)]
     return any(
-        bool(np.any(values <= np.asarray(box.lower) + _ACTIVE) or np.any(values >= np.asarray(box.upper) - _ACTIVE))
+        bool(
+            np.any(values <= np.asarray(box.lower) + _ACTIVE)
+            or np.any(values >= np.asarray(box.upper) - _ACTIVE)
+        )
         for box, values in boxes
     )
 
@@ -185,7 +194,7 @@ def _pointwise(
     solution: Solution, truth: Truth, costates: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Controls and H_u at the start of each step."""
-    gradient = derive(solution.problem).control_gradient.map(len(truth.u_start))
+    gradient = hamiltonian(solution.problem).control_gradient.map(len(truth.u_start))
     slopes = gradient(
         truth.x[:-1].T, truth.u_start.T, costates[:-1].T, truth.t[None, :-1], truth.p_start.T
     )
@@ -228,8 +237,11 @@ def _final_costate(solution: Solution, truth: Truth) -> tuple[np.ndarray, float]
         "ends",
         [m.x, m.t, ocp.p],
         [
-            psi, ca.gradient(ca.SX(ocp.terminal_cost), m.x), ca.jacobian(psi, m.x),
-            ca.jacobian(ca.SX(ocp.terminal_cost), m.t), ca.jacobian(psi, m.t),
+            psi,
+            ca.gradient(ca.SX(ocp.terminal_cost), m.x),
+            ca.jacobian(psi, m.x),
+            ca.jacobian(ca.SX(ocp.terminal_cost), m.t),
+            ca.jacobian(psi, m.t),
         ],
     )
     value, phi_x, psi_x, phi_t, psi_t = (np.array(v, dtype=float) for v in ends(x, t, p))

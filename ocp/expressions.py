@@ -16,9 +16,13 @@ def require_symbols(symbols: ca.SX, what: str) -> None:
     if not isinstance(symbols, ca.SX):
         raise ProblemError(f"{what} is a {type(symbols).__name__}; write it with casadi.SX.sym")
     if symbols.shape[1] != 1 or not symbols.is_dense() or not symbols.is_valid_input():
-        raise ProblemError(f"{what} must be a dense column of symbols, it has shape {symbols.shape}")
+        raise ProblemError(
+            f"{what} must be a dense column of symbols, it has shape {symbols.shape}"
+        )
     if len({element.element_hash() for element in ca.vertsplit(symbols)}) < symbols.numel():
-        raise ProblemError(f"{what} contains the same symbol twice: {', '.join(element_names(symbols))}")
+        raise ProblemError(
+            f"{what} contains the same symbol twice: {', '.join(element_names(symbols))}"
+        )
 
 
 def element_names(symbols: ca.SX) -> tuple[str, ...]:

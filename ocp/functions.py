@@ -20,6 +20,7 @@ class Functions:
         rate: f (nx,).
         running_cost: L.
         terminal_cost: phi.
+        terminal_gradient: phi_x (nx,).
         path: path constraints, stacked.
         initial: initial constraints, stacked.
         terminal: terminal constraints, stacked.
@@ -29,6 +30,7 @@ class Functions:
     rate: ca.Function
     running_cost: ca.Function
     terminal_cost: ca.Function
+    terminal_gradient: ca.Function
     path: ca.Function
     initial: ca.Function
     terminal: ca.Function
@@ -37,7 +39,7 @@ class Functions:
     @classmethod
     def of(cls, ocp: "OCP") -> "Functions":
         """Build them."""
-        m, p = ocp.model, ocp.p
+        m, p, phi = ocp.model, ocp.p, ca.SX(ocp.terminal_cost)
 
         def along(name: str, expression: ca.SX) -> ca.Function:
             return ca.Function(name, [m.x, m.u, m.t, p], [expression], ["x", "u", "t", "p"], [name])
@@ -48,7 +50,8 @@ class Functions:
         return cls(
             rate=along("rate", m.f),
             running_cost=along("running_cost", ca.SX(ocp.running_cost)),
-            terminal_cost=at_an_end("terminal_cost", ca.SX(ocp.terminal_cost)),
+            terminal_cost=at_an_end("terminal_cost", phi),
+            terminal_gradient=at_an_end("terminal_gradient", ca.densify(ca.gradient(phi, m.x))),
             path=along("path", stacked(ocp.at("path"))),
             initial=at_an_end("initial", stacked(ocp.at("initial"))),
             terminal=at_an_end("terminal", stacked(ocp.at("terminal"))),

@@ -38,7 +38,9 @@ class Guess:
             return None
         rows = np.atleast_2d(np.asarray(value, dtype=float))
         if rows.ndim != 2 or rows.shape[1] != width:
-            raise ProblemError(f"guess: {part} has shape {rows.shape}, ({width},) or (N + 1, {width}) is needed")
+            raise ProblemError(
+                f"guess: {part} has shape {rows.shape}, ({width},) or (N + 1, {width}) is needed"
+            )
         if not np.isfinite(rows).all():
             raise ProblemError(f"guess: {part} is not finite")
         if len(rows) == 1:

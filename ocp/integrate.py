@@ -89,8 +89,8 @@ class Stage:
 
     Attributes:
         step: -> (x after the step, cost of the step).
-        adjoint: (..., costate after) -> (costate before, dJ/du) or (..., dJ/du0, dJ/du1), the
-            exact derivative of the *discretised* cost.
+        adjoint: (costate after, x, u, ...) -> (costate before, dJ/du) or (..., dJ/du0, dJ/du1),
+            the exact derivative of the *discretised* cost.
     """
 
     step: ca.Function
@@ -112,7 +112,7 @@ class Stage:
         inputs, names = list(symbols.values()), list(symbols)
         return cls(
             step=ca.Function("step", inputs, [after, cost], names, ["x_next", "cost"]),
-            adjoint=ca.Function("adjoint", [*inputs, costate], gradients),
+            adjoint=ca.Function("adjoint", [costate, *inputs], gradients),
         )
 
 
@@ -124,7 +124,7 @@ def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[
 
     def rate(z: ca.SX, fraction: ca.SX) -> ca.SX:
         """d(x, cost) over the fraction of the interval, in [0, 1]."""
-        u, p = between(s["u0"], s["u1"], fraction), between(s["p0"], s["p1"], fraction)
+        u, p = interpolate(s["u0"], s["u1"], fraction), interpolate(s["p0"], s["p1"], fraction)
         now = (z[:nx], u, s["t"] + fraction * s["h"], p)
         return s["h"] * ca.vertcat(functions.rate(*now), functions.running_cost(*now))
 
@@ -132,6 +132,6 @@ def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[
     return end[:nx], end[nx]
 
 
-def between(left: ca.SX, right: ca.SX, s: ca.SX | float) -> ca.SX:
+def interpolate(left: ca.SX, right: ca.SX, s: ca.SX | float) -> ca.SX:
     """Return the linear interpolation; free of rounding where both ends are equal."""
     return left + s * (right - left)

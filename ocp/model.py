@@ -45,7 +45,9 @@ class Model:
         for label in ("x", "u", "t"):
             require_symbols(getattr(self, label), f"model '{self.name}': {label}")
         if self.t.numel() != 1:
-            raise ProblemError(f"model '{self.name}': t has shape {self.t.shape}, it must be (1, 1)")
+            raise ProblemError(
+                f"model '{self.name}': t has shape {self.t.shape}, it must be (1, 1)"
+            )
         f = column(self.f, f"model '{self.name}': f")
         if f.numel() != self.nx:
             raise ProblemError(
@@ -53,7 +55,9 @@ class Model:
             )
         object.__setattr__(self, "f", f)
         if self.dt is not None and not (0.0 < self.dt < float("inf")):
-            raise ProblemError(f"model '{self.name}': dt = {self.dt} s, it must be positive, finite")
+            raise ProblemError(
+                f"model '{self.name}': dt = {self.dt} s, it must be positive, finite"
+            )
         for label, units, size in (("x", self.x_units, self.nx), ("u", self.u_units, self.nu)):
             if units and len(units) != size:
                 raise ProblemError(

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
-from ocp.constraint import Constraint
+from ocp.constraint import Box, Constraint
 from ocp.errors import UnsupportedProblem
 from ocp.functions import stacked
+from ocp.hamiltonian import Hamiltonian, hamiltonian
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -18,26 +19,24 @@ if TYPE_CHECKING:
 _SINGULAR = 1e-10
 
 
+_LAW_INPUTS = ["x", "costate", "t", "p"]
+
+
 @dataclass(frozen=True, eq=False)
 class Optimality:
-    r"""The necessary conditions, as Functions of (x, costate, ...).
+    r"""The necessary conditions of a minimum.
 
     .. math::
 
-        H = L + \lambda' f, \quad \dot x = H_\lambda', \quad \dot\lambda = -H_x', \quad
-        u^* = \arg\min_u H
+        \dot x = H_\lambda', \quad \dot\lambda = -H_x', \quad u^* = \arg\min_u H
 
-    Signs are those of the minimum principle: the costate is dJ*/dx (thesis 3.60; 3.28 has
-    the other sign). Source: thesis (3.35) to (3.42), [Bryson & Ho 1975].
+    Source: thesis (3.35) to (3.47), [Bryson & Ho 1975].
 
     Attributes:
-        hamiltonian: (x, u, costate, t, p) -> H.
-        control_gradient: (x, u, costate, t, p) -> H_u (nu,).
-        control_curvature: (x, u, costate, t, p) -> H_uu (nu, nu).
-        costate_rate: (x, u, costate, t, p) -> -H_x (nx,).
+        hamiltonian: H and its derivatives.
         control: (x, costate, t, p) -> the minimising control (nu,), within its bounds.
         flow: (z, t, p) -> dz/dt for z = (x, costate), with the minimising control.
-        start: (x, costate, mu, p, t) -> what must vanish at t0 where the start is free:
+        start: (x, costate, mu, t, p) -> what must vanish at t0 where the start is free:
             the initial constraints c, and costate + c_x' mu (the costate is then normal
             to the manifold, thesis 3.45).
         end: (x, costate, nu, t, p) -> what must vanish at the final time:
@@ -45,10 +44,7 @@ class Optimality:
             time is free H + phi_t + nu' psi_t.
     """
 
-    hamiltonian: ca.Function
-    control_gradient: ca.Function
-    control_curvature: ca.Function
-    costate_rate: ca.Function
+    hamiltonian: Hamiltonian
     control: ca.Function
     flow: ca.Function
     start: ca.Function
@@ -65,42 +61,26 @@ def derive(ocp: "OCP") -> Optimality:
             terminal or initial inequalities.
     """
     if ocp.model.is_discrete:
-        raise UnsupportedProblem(f"{ocp.name}: the minimum principle here is that of continuous time")
-    m, p = ocp.model, ocp.p
-    costate = ca.SX.sym("costate", m.nx)
-    hamiltonian = ocp.running_cost + ca.dot(costate, m.f)
-    gradient = ca.densify(ca.gradient(hamiltonian, m.u))
-    curvature = ca.jacobian(gradient, m.u)
-    rate = -ca.densify(ca.gradient(hamiltonian, m.x))
-    variables = [m.x, m.u, costate, m.t, p]
-    names = ["x", "u", "costate", "t", "p"]
-
-    def along(name: str, expression: ca.SX) -> ca.Function:
-        return ca.Function(name, variables, [expression], names, [name])
-
-    curvature_function = along("control_curvature", ca.densify(curvature))
-    gradient_function = along("control_gradient", gradient)
-    _require_regular(ocp, hamiltonian, curvature, curvature_function)
-    control = _minimising_control(ocp, costate, gradient, curvature, gradient_function)
+        raise UnsupportedProblem(
+            f"{ocp.name}: the minimum principle here is that of continuous time"
+        )
+    h = hamiltonian(ocp)
+    _require_regular(ocp, h)
+    control = _minimising_control(ocp, h)
     return Optimality(
-        hamiltonian=along("hamiltonian", hamiltonian),
-        control_gradient=gradient_function,
-        control_curvature=curvature_function,
-        costate_rate=along("costate_rate", rate),
+        hamiltonian=h,
         control=control,
-        flow=_flow(ocp, control, along("costate_rate", rate)),
-        start=_start(ocp, costate),
-        end=_end(ocp, costate, control, along("hamiltonian", hamiltonian)),
+        flow=_flow(ocp, control, h),
+        start=_start(ocp),
+        end=_end(ocp, control, h),
     )
 
 
-def _require_regular(
-    ocp: "OCP", hamiltonian: ca.SX, curvature: ca.SX, curvature_function: ca.Function
-) -> None:
+def _require_regular(ocp: "OCP", h: Hamiltonian) -> None:
     """Refuse a Hamiltonian that does not determine the control."""
     m = ocp.model
     for i, name in enumerate(m.u_names):
-        if curvature[i, :].nnz() == 0:
+        if h.expressions.curvature[i, :].nnz() == 0:
             raise UnsupportedProblem(
                 f"{ocp.name}: the Hamiltonian is linear in the control {name}: its minimum is "
                 "bang-bang or singular; use a direct method"
@@ -108,8 +88,9 @@ def _require_regular(
     p0 = ocp.parameter_values().at(0.0)[0]
     u0 = ocp.control_bounds.clip(np.zeros(m.nu))
     probes = [np.zeros(m.nx), *np.random.default_rng(0).normal(size=(3, m.nx))]
-    hessians = [np.array(curvature_function(ocp.x0, u0, probe, 0.0, p0)) for probe in probes]
-    if all(np.linalg.matrix_rank(h, tol=_SINGULAR * (1 + np.abs(h).max())) < m.nu for h in hessians):
+    hessians = [np.array(h.control_curvature(ocp.x0, u0, probe, 0.0, p0)) for probe in probes]
+    ranks = [np.linalg.matrix_rank(a, tol=_SINGULAR * (1.0 + np.abs(a).max())) for a in hessians]
+    if max(ranks) < m.nu:
         raise UnsupportedProblem(
             f"{ocp.name}: H_uu is singular, the Hamiltonian does not determine the control; "
             "add the cost of the directions without effect (for a redundant arm: the "
@@ -117,84 +98,83 @@ def _require_regular(
         )
 
 
-def _minimising_control(
-    ocp: "OCP", costate: ca.SX, gradient: ca.SX, curvature: ca.SX, gradient_function: ca.Function
-) -> ca.Function:
+def _minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     """Closed form where H is quadratic in u, saturated at the bounds; else an implicit root."""
-    m, p = ocp.model, ocp.p
-    inputs, names = [m.x, costate, m.t, p], ["x", "costate", "t", "p"]
+    m, p, e = ocp.model, ocp.p, h.expressions
     box = ocp.control_bounds
-    quadratic = not ca.depends_on(curvature, m.u)
-    diagonal = curvature.sparsity().is_diag()
-    if not quadratic or (box.is_active and not diagonal):
-        return _implicit_control(ocp, gradient_function)
-    at_zero = ca.substitute(gradient, m.u, ca.DM.zeros(m.nu))
-    free = -at_zero / ca.diag(curvature) if diagonal else -ca.solve(curvature, at_zero)
-    bounded = _clip(free, box.lower, box.upper) if box.is_active else free
-    return ca.Function("control", inputs, [bounded], names, ["u"])
+    diagonal = e.curvature.sparsity().is_diag()
+    if ca.depends_on(e.curvature, m.u) or (box.is_active and not diagonal):
+        return _implicit_control(ocp, h)
+    at_zero = ca.substitute(e.gradient, m.u, ca.DM.zeros(m.nu))
+    free = -at_zero / ca.diag(e.curvature) if diagonal else -ca.solve(e.curvature, at_zero)
+    bounded = _clip(free, box) if box.is_active else free
+    return ca.Function("control", [m.x, e.costate, m.t, p], [bounded], _LAW_INPUTS, ["u"])
 
 
-def _implicit_control(ocp: "OCP", gradient_function: ca.Function) -> ca.Function:
+def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     """Root in u of the natural residual u - clip(u - H_u), by Newton from the nearest point to 0."""
-    m = ocp.model
+    m, box = ocp.model, ocp.control_bounds
     u = ca.MX.sym("u", m.nu)
-    inputs = [ca.MX.sym("x", m.nx), ca.MX.sym("costate", m.nx), ca.MX.sym("t"), ca.MX.sym("p", ocp.p.numel())]
+    sizes = (m.nx, m.nx, 1, ocp.p.numel())
+    inputs = [ca.MX.sym(name, size) for name, size in zip(_LAW_INPUTS, sizes, strict=True)]
     x, costate, t, p = inputs
-    slope = gradient_function(x, u, costate, t, p)
-    box = ocp.control_bounds
-    residual = u - _clip(u - slope, box.lower, box.upper) if box.is_active else slope
-    root = ca.rootfinder(
-        "root", "newton", {"x": u, "p": ca.vertcat(x, costate, t, p), "g": residual},
-        {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50, "error_on_fail": False},
-    )
+    slope = h.control_gradient(x, u, costate, t, p)
+    residual = u - _clip(u - slope, box) if box.is_active else slope
+    options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50, "error_on_fail": False}
+    given = ca.vertcat(*inputs)
+    root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
     guess = box.clip(np.zeros(m.nu))
-    return ca.Function(
-        "control", inputs, [root(guess, ca.vertcat(x, costate, t, p))], ["x", "costate", "t", "p"], ["u"]
-    )
+    return ca.Function("control", inputs, [root(guess, given)], _LAW_INPUTS, ["u"])
 
 
-def _clip(value: ca.SX, lower: object, upper: object) -> ca.SX:
-    return ca.fmin(ca.fmax(value, ca.DM(np.asarray(lower))), ca.DM(np.asarray(upper)))
+def _clip(value: Any, box: Box) -> Any:
+    return ca.fmin(ca.fmax(value, ca.DM(np.asarray(box.lower))), ca.DM(np.asarray(box.upper)))
 
 
-def _flow(ocp: "OCP", control: ca.Function, costate_rate: ca.Function) -> ca.Function:
-    m, n_p = ocp.model, ocp.p.numel()
-    # An implicit control is a root finder, which exists only in MX graphs.
-    kind = ca.SX if control.is_a("SXFunction") else ca.MX
-    z, t, p = kind.sym("z", 2 * m.nx), kind.sym("t"), kind.sym("p", n_p)
+def _flow(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
+    m = ocp.model
+    kind = symbol_kind(control)
+    z, t, p = kind.sym("z", 2 * m.nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
     x, costate = z[: m.nx], z[m.nx :]
     u = control(x, costate, t, p)
-    rate = ca.vertcat(ocp.functions.rate(x, u, t, p), costate_rate(x, u, costate, t, p))
+    rate = ca.vertcat(ocp.functions.rate(x, u, t, p), h.costate_rate(x, u, costate, t, p))
     return ca.Function("flow", [z, t, p], [rate], ["z", "t", "p"], ["rate"])
 
 
-def _start(ocp: "OCP", costate: ca.SX) -> ca.Function:
+def _start(ocp: "OCP") -> ca.Function:
     m = ocp.model
+    costate = ca.SX.sym("costate", m.nx)
     c = _equations(ocp, ocp.at("initial"))
     mu = ca.SX.sym("mu", c.numel())
     normal = costate + ca.mtimes(ca.jacobian(c, m.x).T, mu)
-    return ca.Function(
-        "start", [m.x, costate, mu, m.t, ocp.p], [ca.vertcat(c, normal)],
-        ["x", "costate", "mu", "t", "p"], ["residual"],
-    )
+    names = ["x", "costate", "mu", "t", "p"]
+    inputs = [m.x, costate, mu, m.t, ocp.p]
+    return ca.Function("start", inputs, [ca.vertcat(c, normal)], names, ["residual"])
 
 
-def _end(ocp: "OCP", costate: ca.SX, control: ca.Function, hamiltonian: ca.Function) -> ca.Function:
-    m, p = ocp.model, ocp.p
+def _end(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
+    m = ocp.model
+    costate = ca.SX.sym("costate", m.nx)
     psi = _equations(ocp, ocp.at("terminal"))
     nu = ca.SX.sym("nu", psi.numel())
     bolza = ocp.terminal_cost + ca.dot(nu, psi)
+    left_over = ca.vertcat(costate - ca.gradient(bolza, m.x), psi)
     conditions = ca.Function(
-        "conditions", [m.x, costate, nu, m.t, p],
-        [ca.vertcat(costate - ca.gradient(bolza, m.x), psi), ca.gradient(bolza, m.t)],
+        "conditions", [m.x, costate, nu, m.t, ocp.p], [left_over, ca.gradient(bolza, m.t)]
     )
-    sizes = {"x": m.nx, "costate": m.nx, "nu": nu.numel(), "t": 1, "p": p.numel()}
-    kind = ca.SX if control.is_a("SXFunction") else ca.MX
-    x, lam, nu, t, p = inputs = [kind.sym(name, size) for name, size in sizes.items()]
-    residual, bolza_t = conditions(x, lam, nu, t, p)
+    sizes = {"x": m.nx, "costate": m.nx, "nu": nu.numel(), "t": 1, "p": ocp.p.numel()}
+    kind = symbol_kind(control)
+    inputs = [kind.sym(name, size) for name, size in sizes.items()]
+    x, lam, _, t, p = inputs
+    residual, bolza_t = conditions(*inputs)
     if ocp.has_free_time:
-        residual = ca.vertcat(residual, hamiltonian(x, control(x, lam, t, p), lam, t, p) + bolza_t)
+        residual = ca.vertcat(residual, h.value(x, control(x, lam, t, p), lam, t, p) + bolza_t)
     return ca.Function("end", inputs, [residual], list(sizes), ["residual"])
+
+
+def symbol_kind(function: ca.Function) -> Any:
+    """Return the symbol class a function can be used with: MX if it holds a root finder."""
+    return ca.SX if function.is_a("SXFunction") else ca.MX
 
 
 def _equations(ocp: "OCP", constraints: tuple[Constraint, ...]) -> ca.SX:

@@ -68,7 +68,9 @@ class Signal:
         """Check symbol and samples."""
         require_symbols(self.symbol, f"signal '{self.name}'")
         if self.hold not in ("held", "linear"):
-            raise ProblemError(f"signal '{self.name}': hold = {self.hold!r} is neither held nor linear")
+            raise ProblemError(
+                f"signal '{self.name}': hold = {self.hold!r} is neither held nor linear"
+            )
         object.__setattr__(self, "samples", self.checked(self.samples))
 
     @property
@@ -149,11 +151,15 @@ class ParameterValues:
     @property
     def knots(self) -> np.ndarray:
         """All fractions of the horizon at which some signal is not smooth."""
-        return np.unique(np.concatenate([[0.0, 1.0], *[self._knots(i) for i in range(len(self.values))]]))
+        return np.unique(
+            np.concatenate([[0.0, 1.0], *[self._knots(i) for i in range(len(self.values))]])
+        )
 
     def _knots(self, i: int) -> np.ndarray:
         entry = self.entries[i]
-        return np.linspace(0.0, 1.0, len(self.values[i])) if isinstance(entry, Signal) else entry.knots
+        return (
+            np.linspace(0.0, 1.0, len(self.values[i])) if isinstance(entry, Signal) else entry.knots
+        )
 
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""

@@ -96,7 +96,11 @@ class OCP:
         set_(self, "x0", numbers(self.x0, model.nx, f"{self.name}: x0"))
         set_(self, "running_cost", scalar(self.running_cost, f"{self.name}: running_cost"))
         set_(self, "terminal_cost", scalar(self.terminal_cost, f"{self.name}: terminal_cost"))
-        set_(self, "control_bounds", self.control_bounds.sized(model.nu, f"{self.name}: control_bounds"))
+        set_(
+            self,
+            "control_bounds",
+            self.control_bounds.sized(model.nu, f"{self.name}: control_bounds"),
+        )
         set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
         self._check_names()
         self._check_horizon()
@@ -165,7 +169,10 @@ class OCP:
         outside = np.flatnonzero(self.state_bounds.excess(start))
         if outside.size and not self.has_free_start:
             i = int(outside[0])
-            low, high = np.asarray(self.state_bounds.lower)[i], np.asarray(self.state_bounds.upper)[i]
+            low, high = (
+                np.asarray(self.state_bounds.lower)[i],
+                np.asarray(self.state_bounds.upper)[i],
+            )
             raise ProblemError(
                 f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {start[i]} is outside "
                 f"its bounds [{low}, {high}]"
@@ -196,7 +203,9 @@ class OCP:
                 raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
             return
         if not isinstance(self.horizon, int | float) or not 0.0 < self.horizon < np.inf:
-            raise ProblemError(f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite")
+            raise ProblemError(
+                f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite"
+            )
         if self.model.is_discrete and self.horizon != int(self.horizon):
             raise ProblemError(
                 f"{self.name}: horizon = {self.horizon} of a discrete-time model is a number of steps"
@@ -207,14 +216,18 @@ class OCP:
         declared = element_names(ca.vertcat(model.x, model.u, model.t, p))
         hashes = {e.element_hash() for e in ca.vertsplit(ca.vertcat(model.x, model.u, model.t, p))}
         if len(hashes) < len(declared):
-            raise ProblemError(f"{self.name}: a symbol is declared twice among x, u, t and parameters")
+            raise ProblemError(
+                f"{self.name}: a symbol is declared twice among x, u, t and parameters"
+            )
         model.refuse_foreign_symbols(p)
         everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
         refuse_foreign_symbols(self.running_cost, everywhere, f"{self.name}: running_cost")  # type: ignore[arg-type]
         refuse_foreign_symbols(self.terminal_cost, at_ends, f"{self.name}: terminal_cost")  # type: ignore[arg-type]
         for c in self.constraints:
             allowed = everywhere if c.at == "path" else at_ends
-            refuse_foreign_symbols(c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'")
+            refuse_foreign_symbols(
+                c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'"
+            )
         for c in self.invariants:
             refuse_foreign_symbols(c.expression, at_ends, f"{self.name}: invariant '{c.name}'")
             if c.at != "path":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.data import Data
 from ocp.errors import ProblemError, SolverError
 from ocp.optimality import derive
 from ocp.problem import OCP
@@ -100,6 +101,13 @@ class Solution:
             if not np.isfinite(array).all():
                 raise ProblemError(f"solution: {name} is not finite")
 
+    def __repr__(self) -> str:
+        """Return one line: what was solved, how it ended, what the solver believes it costs."""
+        return (
+            f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
+            f"{self.iterations} iterations, {len(self.t) - 1} intervals>"
+        )
+
     @property
     def duration(self) -> float:
         """Final time minus t0 [s]."""
@@ -109,6 +117,11 @@ class Solution:
     def fractions(self) -> np.ndarray:
         """The nodes as fractions of the horizon, from 0 to 1."""
         return (self.t - self.t[0]) / self.duration
+
+    @property
+    def data(self) -> Data:
+        """The numbers of the run it comes from."""
+        return Data(self.x0, float(self.t[0]), self.problem.parameter_values(self.parameters))
 
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
@@ -151,7 +164,9 @@ class Solution:
         times = self.t[0] + np.asarray(fractions) * self.duration
         values = {"x": self.state, "u": self.control, "costate": self.costate_at}[part](times)
         if values.shape[1] != width:
-            raise ProblemError(f"guess: the solution has {values.shape[1]} of {part}, {width} are needed")
+            raise ProblemError(
+                f"guess: the solution has {values.shape[1]} of {part}, {width} are needed"
+            )
         return values
 
     # -- to look at, to keep --------------------------------------------------------

@@ -8,25 +8,10 @@ import casadi as ca
 import numpy as np
 
 from ocp.constraint import Constraint
+from ocp.data import Data
 from ocp.functions import stacked
 from ocp.integrate import Integrator, Stage
-from ocp.parameters import ParameterValues
 from ocp.problem import OCP
-
-
-@dataclass(frozen=True)
-class Data:
-    """The numbers of one run.
-
-    Attributes:
-        x0: start (nx,), or a guess of it.
-        t0: initial time [s].
-        values: parameters and signals.
-    """
-
-    x0: np.ndarray
-    t0: float
-    values: ParameterValues
 
 
 @dataclass(frozen=True)
@@ -106,7 +91,13 @@ class Transcription:
     @cached_property
     def program(self) -> dict[str, ca.MX]:
         """Unknowns x, cost f, constraints g and data p, as ``casadi.nlpsol`` takes them."""
-        ocp, nx, nu, n_p, n = self.ocp, self.ocp.model.nx, self.ocp.model.nu, self.ocp.p.numel(), self.n
+        ocp, nx, nu, n_p, n = (
+            self.ocp,
+            self.ocp.model.nx,
+            self.ocp.model.nu,
+            self.ocp.p.numel(),
+            self.n,
+        )
         w = ca.MX.sym("w", self.size)
         data = ca.MX.sym("data", 1 + n_p * (2 * n + 1))
         t0 = data[0]
@@ -140,7 +131,9 @@ class Transcription:
         ocp = self.ocp
         gap = [Row(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0) for name in ocp.model.x_names]
         gap += [Row("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = _rows(ocp.at("path"), "path") + _rows(ocp.invariants, "path", self.keep) * self._keeps
+        path = (
+            _rows(ocp.at("path"), "path") + _rows(ocp.invariants, "path", self.keep) * self._keeps
+        )
         on_control = self._depends_on_control
         rows: list[Row] = []
         for k in range(self.n):
@@ -186,7 +179,9 @@ class Transcription:
 
     # -- costates -----------------------------------------------------------------------
 
-    def costates(self, w: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray, data: Data) -> np.ndarray:
+    def costates(
+        self, w: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray, data: Data
+    ) -> np.ndarray:
         """Return dJ*/dx at the nodes, (N + 1, nx), from the multipliers.
 
         At nodes 1..N minus the multiplier of the gap; at node 0 what balances the start.
@@ -196,7 +191,8 @@ class Transcription:
         first = -lam_x[:nx]
         if initial:
             jacobian = ca.Function(
-                "c_x", [self.ocp.model.x, self.ocp.model.t, self.ocp.p],
+                "c_x",
+                [self.ocp.model.x, self.ocp.model.t, self.ocp.p],
                 [ca.jacobian(stacked(initial), self.ocp.model.x)],
             )
             p = data.values.at(0.0)[0]
@@ -230,9 +226,13 @@ class Transcription:
     @cached_property
     def _last(self) -> ca.Function:
         m = self.ocp.model
-        rows = [self._path[i] for i, on_control in enumerate(self._depends_on_control) if not on_control]
+        rows = [
+            self._path[i] for i, on_control in enumerate(self._depends_on_control) if not on_control
+        ]
         terminal = stacked(self.ocp.at("terminal"))
-        return ca.Function("last", [m.x, m.t, self.ocp.p], [ca.vertcat(ca.SX(0, 1), *rows, terminal)])
+        return ca.Function(
+            "last", [m.x, m.t, self.ocp.p], [ca.vertcat(ca.SX(0, 1), *rows, terminal)]
+        )
 
 
 def _rows(

@@ -6,8 +6,8 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from ocp.integrate import RK4, Stage, between
-from ocp.optimality import derive
+from ocp.integrate import RK4, Stage, interpolate
+from ocp.optimality import derive, symbol_kind
 from ocp.problem import OCP
 from ocp.solution import Solution
 
@@ -81,7 +81,9 @@ def follow(solution: Solution, *, tolerance: float = 1e-9) -> Truth:
     return truth
 
 
-def adjoint(solution: Solution, truth: Truth, final: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def adjoint(
+    solution: Solution, truth: Truth, final: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return costates (K + 1, nx) and gradients dJ/du at both ends of each step, (K, nu) each.
 
     The adjoint of the discretised trajectory itself, from ``final`` backwards: consistent
@@ -123,15 +125,25 @@ def _roll(solution: Solution, substeps: int) -> Truth:
     x, cost, u_start, u_end, inner = follow_controls(solution, fine, start, schedule)
     cost += float(ocp.functions.terminal_cost(x[-1], t[-1], values.at(1.0)[0]))
     return Truth(
-        t=t, x=x, u_start=u_start, u_end=u_end, p_start=p_start, p_end=p_end, cost=cost,
-        cost_error=0.0, inner=inner, substeps=substeps,
+        t=t,
+        x=x,
+        u_start=u_start,
+        u_end=u_end,
+        p_start=p_start,
+        p_end=p_end,
+        cost=cost,
+        cost_error=0.0,
+        inner=inner,
+        substeps=substeps,
     )
 
 
 Rolled = tuple[np.ndarray, float, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _roll_controls(solution: Solution, fine: np.ndarray, start: np.ndarray, schedule: list) -> Rolled:
+def _roll_controls(
+    solution: Solution, fine: np.ndarray, start: np.ndarray, schedule: list
+) -> Rolled:
     """Held or linear controls: known functions of time."""
     nodes = solution.fractions
     if solution.control_kind == "held":
@@ -148,7 +160,9 @@ def _roll_controls(solution: Solution, fine: np.ndarray, start: np.ndarray, sche
     return states, float(np.sum(np.array(costs))), u_start, u_end, np.empty((len(u_start), 0))
 
 
-def _roll_extremal(solution: Solution, fine: np.ndarray, start: np.ndarray, schedule: list) -> Rolled:
+def _roll_extremal(
+    solution: Solution, fine: np.ndarray, start: np.ndarray, schedule: list
+) -> Rolled:
     """The control minimising H along (x, costate), both restarted at the solution's nodes.
 
     The plant's own state runs through: the control is a function of time, as it would be
@@ -179,19 +193,12 @@ def _machine(ocp: OCP, extremal: bool) -> _Machine:
     if extremal:
         return _extremal_machine(ocp)
     stage = Stage.of(ocp, RK4(), held=False)
-    return _Machine(step=stage.step, adjoint=_costate_first(stage.adjoint))
-
-
-def _costate_first(adjoint_step: ca.Function) -> ca.Function:
-    """Reorder the inputs so that ``mapaccum`` carries the costate."""
-    inputs = [ca.MX.sym(adjoint_step.name_in(i), adjoint_step.sparsity_in(i)) for i in range(adjoint_step.n_in())]
-    outputs = adjoint_step(*inputs)
-    return ca.Function("adjoint", [inputs[-1], *inputs[:-1]], outputs)
+    return _Machine(step=stage.step, adjoint=stage.adjoint)
 
 
 def _extremal_machine(ocp: OCP) -> _Machine:
     optimality, functions, nx, n_p = derive(ocp), ocp.functions, ocp.model.nx, ocp.p.numel()
-    kind = ca.SX if optimality.flow.is_a("SXFunction") else ca.MX
+    kind = symbol_kind(optimality.flow)
     x, z, z_node = kind.sym("x", nx), kind.sym("z", 2 * nx), kind.sym("z_node", 2 * nx)
     restart, t, h = kind.sym("restart"), kind.sym("t"), kind.sym("h")
     p0, p1, costate = kind.sym("p0", n_p), kind.sym("p1", n_p), kind.sym("costate", nx)
@@ -199,7 +206,7 @@ def _extremal_machine(ocp: OCP) -> _Machine:
 
     def rate(y, s):  # noqa: ANN001, ANN202 - SX or MX, as the control is closed or implicit
         """d(x, cost, z)/ds; the control is that of z, not of x."""
-        inner, at, p = y[nx + 1 :], t + s * h, between(p0, p1, s)
+        inner, at, p = y[nx + 1 :], t + s * h, interpolate(p0, p1, s)
         u = optimality.control(inner[:nx], inner[nx:], at, p)
         plant = (functions.rate(y[:nx], u, at, p), functions.running_cost(y[:nx], u, at, p))
         return h * ca.vertcat(*plant, optimality.flow(inner, at, p))
@@ -213,10 +220,13 @@ def _extremal_machine(ocp: OCP) -> _Machine:
     chosen = ca.if_else(restart > 0.5, z_node, z)
     x_next, z_next, cost, u_start, u_end = core(x, chosen, t, h, p0, p1)
     step = ca.Function(
-        "step", [x, z, restart, z_node, t, h, p0, p1],
+        "step",
+        [x, z, restart, z_node, t, h, p0, p1],
         [x_next, z_next, cost, chosen, u_start, u_end],
     )
     total = core(*core_inputs)[2] + ca.dot(costate, core(*core_inputs)[0])
     zero = kind.zeros(ocp.model.nu)
-    adjoint_step = ca.Function("adjoint", [costate, *core_inputs], [ca.gradient(total, x), zero, zero])
+    adjoint_step = ca.Function(
+        "adjoint", [costate, *core_inputs], [ca.gradient(total, x), zero, zero]
+    )
     return _Machine(step=step, adjoint=adjoint_step)

@@ -61,14 +61,18 @@ class MultipleShooting(Solver):
     def __post_init__(self) -> None:
         """Check the options."""
         if self.intervals < 1:
-            raise ProblemError(f"multiple shooting needs at least one interval, not {self.intervals}")
+            raise ProblemError(
+                f"multiple shooting needs at least one interval, not {self.intervals}"
+            )
         if self.backend not in _OPTIONS:
             raise ProblemError(f"backend {self.backend!r} is not one of {', '.join(_OPTIONS)}")
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
         if self.backend == "fatrop" and any(not c.is_equation for c in ocp.at("initial")):
-            raise UnsupportedProblem(f"{ocp.name}: fatrop takes no inequality at the start; use ipopt")
+            raise UnsupportedProblem(
+                f"{ocp.name}: fatrop takes no inequality at the start; use ipopt"
+            )
         keep = self.keep if ocp.at("path") else np.inf
         transcription = Transcription(ocp, self.intervals, self.integrator, keep)
         options = _OPTIONS[self.backend](self, transcription)
@@ -140,7 +144,7 @@ class MultipleShootingProgram(Program):
         ocp, m, nodes = tr.ocp, tr.ocp.model, tr.fractions
         x = guess.sample("x", nodes, m.nx) if guess else None
         u = guess.sample("u", nodes[:-1], m.nu) if guess else None
-        duration = (guess.duration if guess else None) or ocp.duration
+        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         if u is None:
             u = np.zeros((tr.n, m.nu))
         u = ocp.control_bounds.clip(u)
@@ -160,7 +164,12 @@ class MultipleShootingProgram(Program):
         return states if np.isfinite(states).all() else np.tile(data.x0, (n + 1, 1))
 
     def _solution(
-        self, data: Data, result: dict[str, np.ndarray], bounds: dict, w0: np.ndarray, seconds: float
+        self,
+        data: Data,
+        result: dict[str, np.ndarray],
+        bounds: dict,
+        w0: np.ndarray,
+        seconds: float,
     ) -> Solution:
         tr, stats = self.transcription, self.nlp.stats()
         finite = all(np.isfinite(result[name]).all() for name in ("x", "lam_x", "lam_g"))

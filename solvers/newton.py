@@ -1,7 +1,8 @@
 """Newton's method for a square system, damped so that it cannot cycle."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -31,13 +32,15 @@ class NewtonResult:
     history: np.ndarray
 
 
-Residual = Callable[[np.ndarray], np.ndarray]
-Linearise = Callable[[np.ndarray], Callable[[np.ndarray], np.ndarray]]
+T = TypeVar("T")
+Residual = Callable[[np.ndarray], tuple[np.ndarray, T]]
+Solve = Callable[[np.ndarray], np.ndarray]
+Linearise = Callable[[np.ndarray, T], Solve]
 
 
 def newton(
-    residual: Residual,
-    linearise: Linearise,
+    residual: Residual[T],
+    linearise: Linearise[T],
     x: np.ndarray,
     *,
     tolerance: float,
@@ -52,60 +55,63 @@ def newton(
     of states against costates. Undamped, this is the thesis' (3.50).
 
     Args:
-        residual: x (n,) -> (n,); may return values that are not finite.
-        linearise: x -> a function that solves J(x) d = r for d; not finite if J is singular.
+        residual: x (n,) -> its residual (n,), which may be not finite, and whatever
+            ``linearise`` can use again.
+        linearise: x and that -> a function that solves J(x) d = r for d, not finite where J
+            is singular.
         x: first iterate.
         tolerance: on the max norm of the residual.
         max_steps: limit.
         damped: whether to test steps at all.
     """
-    r = residual(x)
-    evaluations, history, best = 1, [_norm(r)], (x, _norm(r))
-    steps = 0
-    while steps < max_steps and tolerance < history[-1] < np.inf:
-        solve = linearise(x)
-        d = -solve(r)
+    iterate = _Iterate(x, *residual(x))
+    best, history, evaluations, stalled = iterate, [iterate.norm], 1, False
+    while not stalled and len(history) <= max_steps and tolerance < iterate.norm < np.inf:
+        solve = linearise(iterate.x, iterate.extra)
+        d = -solve(iterate.r)
         if not np.isfinite(d).all():
             break
-        steps += 1
-        x, r, tried = _advance(residual, solve, x, d, damped)
-        evaluations += tried
-        history.append(_norm(r))
-        if history[-1] < best[1]:
-            best = (x, history[-1])
-        if damped and not tried:
-            break
+        for fraction in _fractions(damped):
+            trial = _Iterate(iterate.x + fraction * d, *residual(iterate.x + fraction * d))
+            evaluations += 1
+            if not damped or trial.norm <= tolerance or _is_shorter(trial, solve, d, fraction):
+                break
+        else:
+            stalled = True
+            continue
+        iterate = trial
+        history.append(iterate.norm)
+        best = min(best, iterate, key=lambda i: i.norm)
     return NewtonResult(
-        x=best[0],
-        residual=best[1],
-        converged=best[1] <= tolerance,
-        diverged=not history[-1] < np.inf,
-        steps=steps,
+        x=best.x,
+        residual=best.norm,
+        converged=best.norm <= tolerance,
+        diverged=not iterate.norm < np.inf,
+        steps=len(history) - 1,
         evaluations=evaluations,
         history=np.array(history),
     )
 
 
-def _advance(
-    residual: Residual, solve: Callable, x: np.ndarray, d: np.ndarray, damped: bool
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """Take the longest step that passes; 0 evaluations reported if none does."""
-    fraction, tried = 1.0, 0
-    length = np.linalg.norm(d)
-    while True:
-        candidate = x + fraction * d
-        r = residual(candidate)
-        tried += 1
-        if not damped:
-            return candidate, r, tried
-        if np.isfinite(r).all():
-            correction = np.linalg.norm(solve(r))
-            if correction <= (1.0 - fraction / 4.0) * length:
-                return candidate, r, tried
+@dataclass(frozen=True, eq=False)
+class _Iterate(Generic[T]):
+    x: np.ndarray
+    r: np.ndarray
+    extra: T
+
+    @property
+    def norm(self) -> float:
+        return float(np.abs(self.r).max(initial=0.0)) if np.isfinite(self.r).all() else np.inf
+
+
+def _fractions(damped: bool) -> Iterator[float]:
+    fraction = 1.0
+    while fraction >= (_SMALLEST_STEP if damped else 1.0):
+        yield fraction
         fraction /= 2.0
-        if fraction < _SMALLEST_STEP:
-            return x, residual(x), 0
 
 
-def _norm(r: np.ndarray) -> float:
-    return float(np.abs(r).max(initial=0.0)) if np.isfinite(r).all() else np.inf
+def _is_shorter(trial: _Iterate, solve: Solve, d: np.ndarray, fraction: float) -> bool:
+    if trial.norm == np.inf:
+        return False
+    return bool(np.linalg.norm(solve(trial.r)) <= (1.0 - fraction / 4.0) * np.linalg.norm(d))

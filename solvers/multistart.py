@@ -1,0 +1,85 @@
+"""Many starts, the distinct local optima they lead to."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ocp import OCP, Guess, Solution, Solver, evaluate
+
+# Two answers whose true costs agree to this are the same optimum.
+_SAME_COST = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LocalOptimum:
+    """One of the optima found.
+
+    Attributes:
+        solution: the best answer that led to it.
+        cost: the referee's.
+        found: how many starts ended in it.
+    """
+
+    solution: Solution
+    cost: float
+    found: int
+
+
+def multistart(
+    ocp: OCP,
+    solver: Solver,
+    starts: int,
+    seed: int,
+    *,
+    amplitude: float = 3.0,
+    violation: float = 1e-4,
+) -> tuple[LocalOptimum, ...]:
+    """Solve from several starts and return the distinct local optima, best first.
+
+    The first start is the problem's own; the others are smooth random controls (a constant
+    and half a cosine wave per control, with normal amplitudes), within their bounds.
+
+    Args:
+        ocp: the problem; built once.
+        solver: any solver.
+        starts: how many, the problem's own included.
+        seed: of the random controls; the same seed gives the same starts.
+        amplitude: standard deviation of the controls, in their own units (where a control is
+            bounded, at most half its range).
+        violation: an answer that violates a constraint by more, in the referee's eyes, does
+            not count.
+
+    Returns:
+        optima with their true costs; empty if no start succeeded.
+    """
+    program = solver.build(ocp)
+    guesses = [None, *_random_guesses(ocp, starts - 1, seed, amplitude)]
+    found: list[LocalOptimum] = []
+    for guess in guesses:
+        solution = program.run(guess=guess)
+        if not solution.status.is_success:
+            continue
+        verdict = evaluate(solution)
+        if verdict.violation <= violation:
+            found = _merged(found, LocalOptimum(solution, verdict.cost, 1))
+    return tuple(sorted(found, key=lambda optimum: optimum.cost))
+
+
+def _random_guesses(ocp: OCP, number: int, seed: int, amplitude: float) -> list[Guess]:
+    rng = np.random.default_rng(seed)
+    box, nu = ocp.control_bounds, ocp.model.nu
+    with np.errstate(invalid="ignore"):
+        half_range = (np.asarray(box.upper, float) - np.asarray(box.lower, float)) / 2.0
+    scale = np.where(np.isfinite(half_range), np.minimum(half_range, amplitude), amplitude)
+    waves = np.stack([np.ones(51), np.cos(np.pi * np.linspace(0.0, 1.0, 51))])
+    shapes = rng.normal(size=(max(number, 0), 2, nu)) * scale
+    return [Guess(u=waves.T @ shape) for shape in shapes]
+
+
+def _merged(found: list[LocalOptimum], new: LocalOptimum) -> list[LocalOptimum]:
+    for i, old in enumerate(found):
+        if abs(old.cost - new.cost) <= _SAME_COST * (1.0 + abs(old.cost)):
+            better = min(old, new, key=lambda optimum: optimum.cost)
+            merged = LocalOptimum(better.solution, better.cost, old.found + 1)
+            return [*found[:i], merged, *found[i + 1 :]]
+    return [*found, new]

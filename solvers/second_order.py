@@ -1,0 +1,120 @@
+"""Is an extremal a minimum? The second-order test: Legendre, and no conjugate point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solvers.extremal import Extremals, Paths, Schedule
+
+# Columns of the Lagrangian plane this close to dependent count as a conjugate point.
+_SINGULAR = 1e-9
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """The outcome of the test.
+
+    Attributes:
+        passed: whether the extremal is a strict local minimum; None where the test does not
+            apply.
+        reason: what failed, and when, or why it does not apply.
+    """
+
+    passed: bool | None
+    reason: str = ""
+
+
+def second_order(
+    extremals: Extremals, v: np.ndarray, schedule: Schedule, paths: Paths
+) -> SecondOrder:
+    r"""Test the sufficient conditions of a weak local minimum along an extremal.
+
+    The solutions of the linearised canonical equations that meet the linearised end
+    conditions form a Lagrangian plane, (X, Y) (2 nx, nx) at every instant. Where
+    :math:`\det X` does not vanish before the final time, :math:`S = Y X^{-1}` is the bounded
+    solution of the Riccati equation, there is no conjugate point, and with
+    :math:`H_{uu} > 0` the extremal is a minimum [Bryson & Ho 1975, ch. 6]. On a start
+    manifold S has to be positive definite on its tangent as well. Carrying the plane instead
+    of S needs no special case for terminal constraints, where S is unbounded at the end.
+
+    Args:
+        extremals: the boundary value problem.
+        v: its solution.
+        schedule: grid of the run.
+        paths: trajectory of ``v``.
+    """
+    ocp = extremals.ocp
+    if ocp.has_free_time:
+        return SecondOrder(None, "the test is not made for a free final time")
+    z, mu, nu, duration = extremals.shape.split(v, schedule.duration)
+    legendre = _legendre(extremals, paths, schedule, duration)
+    if not legendre.passed:
+        return legendre
+    plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
+    slopes, _ = extremals.step_slopes(paths, schedule, duration)
+    sign = 0.0
+    for k in range(len(slopes) - 1, -1, -1):
+        plane = _oriented(np.linalg.solve(slopes[k], plane))
+        smallest = np.linalg.svd(plane[:nx], compute_uv=False)[-1]
+        now = float(np.linalg.slogdet(plane[:nx])[0]) if smallest > _SINGULAR else 0.0
+        if now == 0.0 or now * sign < 0.0:
+            t = schedule.t0 + schedule.fractions[k] * duration
+            return SecondOrder(False, f"conjugate point near t = {t:.4g} s")
+        sign = now
+    if ocp.has_free_start:
+        return _tangent_curvature(extremals, plane, z[0], mu, schedule)
+    return SecondOrder(True)
+
+
+def _legendre(
+    extremals: Extremals, paths: Paths, schedule: Schedule, duration: float
+) -> SecondOrder:
+    t, x, costate, u = extremals.trajectory(paths, schedule, duration)
+    p = np.vstack([schedule.p_left, schedule.p_last])
+    box, nu = extremals.ocp.control_bounds, u.shape[1]
+    curvature = np.array(
+        extremals.optimality.hamiltonian.control_curvature.map(len(t))(
+            x.T, u.T, costate.T, t[None, :], p.T
+        )
+    )
+    hessians = curvature.T.reshape(len(t), nu, nu)
+    free = (u > np.asarray(box.lower)) & (u < np.asarray(box.upper))
+    for k, hessian in enumerate(hessians):
+        inner = hessian[np.ix_(free[k], free[k])]
+        if inner.size and np.linalg.eigvalsh((inner + inner.T) / 2)[0] <= 0.0:
+            return SecondOrder(False, f"H_uu is not positive definite at t = {t[k]:.4g} s")
+    return SecondOrder(True)
+
+
+def _final_plane(
+    extremals: Extremals, paths: Paths, nu: np.ndarray, schedule: Schedule
+) -> np.ndarray:
+    """All (dx, dcostate) that meet the linearised end conditions for some multipliers."""
+    t = schedule.t0 + schedule.duration
+    _, in_z, in_nu, _ = (
+        np.array(a) for a in extremals.ends(paths.ends[-1], nu, t, schedule.p_last)
+    )
+    conditions = np.hstack([in_z, in_nu])
+    _, _, rows = np.linalg.svd(conditions)
+    return _oriented(rows[len(conditions) :, : in_z.shape[1]].T)
+
+
+def _oriented(plane: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the same plane with the same orientation."""
+    q, r = np.linalg.qr(plane)
+    return q * np.sign(np.diag(r))
+
+
+def _tangent_curvature(
+    extremals: Extremals, plane: np.ndarray, z0: np.ndarray, mu: np.ndarray, schedule: Schedule
+) -> SecondOrder:
+    """The cost-to-go must curve upwards along the start manifold."""
+    nx, m = extremals.shape.nx, extremals.shape.n_mu
+    riccati = plane[nx:] @ np.linalg.inv(plane[:nx])
+    _, in_z, _ = (np.array(a) for a in extremals.starts(z0, mu, schedule.t0, schedule.p_first))
+    normals, bending = in_z[:m, :nx], in_z[m:, :nx]
+    tangent = np.linalg.svd(normals)[2][m:].T
+    hessian = tangent.T @ (riccati + bending) @ tangent
+    if hessian.size and np.linalg.eigvalsh((hessian + hessian.T) / 2)[0] <= 0.0:
+        return SecondOrder(False, "the cost does not curve upwards along the start manifold")
+    return SecondOrder(True)
