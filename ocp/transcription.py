@@ -131,9 +131,7 @@ class Transcription:
         ocp = self.ocp
         gap = [Row(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0) for name in ocp.model.x_names]
         gap += [Row("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = (
-            _rows(ocp.at("path"), "path") + _rows(ocp.invariants, "path", self.keep) * self._keeps
-        )
+        path = _rows(ocp.at("path"), "path") + _rows(self._kept, "path", self.keep)
         on_control = self._depends_on_control
         rows: list[Row] = []
         for k in range(self.n):
@@ -205,13 +203,13 @@ class Transcription:
         return np.array([row.place == place for row in self.rows])
 
     @property
-    def _keeps(self) -> bool:
-        return bool(self.ocp.invariants) and np.isfinite(self.keep)
+    def _kept(self) -> tuple[Constraint, ...]:
+        """The invariants that are imposed."""
+        return self.ocp.invariants if np.isfinite(self.keep) else ()
 
     @cached_property
     def _path(self) -> ca.SX:
-        kept = self.ocp.invariants if self._keeps else ()
-        return stacked((*self.ocp.at("path"), *kept))
+        return stacked((*self.ocp.at("path"), *self._kept))
 
     @cached_property
     def _depends_on_control(self) -> tuple[bool, ...]:
