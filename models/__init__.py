@@ -1,1 +1,41 @@
 """Robots, obstacles, tasks and textbook problems, each as symbolic models."""
+
+from models.arm import PlanarArm
+from models.distance_cost import Combine, DistanceCost
+from models.double_integrator import (
+    bryson_denham,
+    discrete_double_integrator,
+    double_integrator_energy,
+    double_integrator_minimum_time,
+)
+from models.obstacles import Disc, distance_to_segment, link_distances
+from models.oscillators import hypersensitive, rayleigh, van_der_pol
+from models.paths import Path, line, path_position, path_velocity
+from models.redundancy import Cost, Form, redundancy_ocp
+from models.scenarios import ArmScenario, Difficulty, random_scenarios
+
+__all__ = [
+    "ArmScenario",
+    "Combine",
+    "Cost",
+    "Difficulty",
+    "Disc",
+    "DistanceCost",
+    "Form",
+    "Path",
+    "PlanarArm",
+    "bryson_denham",
+    "discrete_double_integrator",
+    "distance_to_segment",
+    "double_integrator_energy",
+    "double_integrator_minimum_time",
+    "hypersensitive",
+    "line",
+    "link_distances",
+    "path_position",
+    "path_velocity",
+    "random_scenarios",
+    "rayleigh",
+    "redundancy_ocp",
+    "van_der_pol",
+]

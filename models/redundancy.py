@@ -1,0 +1,211 @@
+"""Kinematic control of a redundant arm as an optimal control problem."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+from numpy.typing import ArrayLike
+
+from models._numbers import at_least, vector
+from models.arm import PlanarArm
+from models.distance_cost import DistanceCost
+from models.obstacles import Disc, link_distances
+from models.paths import Path, path_position, path_velocity
+from models.task import Task
+from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal
+
+Cost = Literal["regularised", "raw"]
+Form = Literal["null-space", "velocity"]
+
+
+def redundancy_ocp(
+    arm: PlanarArm,
+    path: Path,
+    *,
+    theta0: ArrayLike,
+    horizon: float,
+    obstacles: Sequence[Disc] = (),
+    distance_cost: DistanceCost | None = None,
+    weight: float = 1.0,
+    cost: Cost = "regularised",
+    form: Form = "null-space",
+    correction: float = 0.0,
+    clearance: float | None = None,
+    joint_bounds: Box | None = None,
+    velocity_bounds: Box | None = None,
+    free_start: bool = False,
+    parameters: Sequence[Parameter | Signal] = (),
+    t: ca.SX | None = None,
+    name: str = "redundant arm",
+) -> OCP:
+    r"""Return the problem of following a path while staying away from obstacles.
+
+    Null-space form, control y (n,):
+
+    .. math::
+
+        \min \int k\,p_0(\theta) + \dot\theta'\dot\theta \, dt, \quad
+        \dot\theta = J^\# \dot r + N y, \quad
+        \dot r = \dot r_d + K (r_d - r(\theta)), \quad
+        J^\# = J'(JJ')^{-1}, \; N = E - J^\# J
+
+    This raw cost says nothing about the part of y in the row space of J, which moves
+    nothing: H_yy is singular. The regularised cost adds its square, ‖J#J y‖². Neither the
+    optimum nor its value changes, and because J#ṙ, N y and J#J y are orthogonal,
+
+    .. math:: k\,p_0 + \lVert J^\# \dot r \rVert^2 + y'y, \qquad H_{yy} = 2E,
+
+    which is how it is written here.
+
+    Velocity form, control v = dθ/dt (n,): cost k p0 + v'v, path constraint ``"task"``
+    J v = ṙ. It is the plant for controllers whose dθ/dt is not of the form J#ṙ + N y.
+
+    The invariant ``"task error"`` is r(θ) - r_d(t) [m]; it is kept where the arm starts on
+    the path, and decays with the rate K where it does not.
+
+    Source: thesis (3.17) without damping, (3.18), (3.32), (3.37); [Nakamura 1991].
+
+    Args:
+        arm: the arm, n >= 2 links.
+        path: r_d(t), any callable from the time symbol to (2,) [m].
+        theta0: start configuration (n,) [rad].
+        horizon: duration [s].
+        obstacles: discs; with none there is no distance cost.
+        distance_cost: p0; ``None``: no such cost.
+        weight: k of (3.37), not negative.
+        cost: ``"regularised"`` or ``"raw"``; the velocity form has only one cost.
+        form: ``"null-space"`` or ``"velocity"``.
+        correction: K of (3.18) [1/s], not negative; 0: a path error stays for ever.
+        clearance: every link keeps at least this distance [m] from the centre of every
+            disc, as path constraint ``"clearance"``; ``None``: no such constraint.
+        joint_bounds: limits of θ [rad].
+        velocity_bounds: limits of dθ/dt [rad/s]: control bounds of the velocity form, path
+            constraint ``"joint velocity"`` of the null-space form.
+        free_start: require only that the end effector starts on the path (initial
+            constraint ``"start on path"``, thesis 3.46); ``theta0`` is then a guess.
+        parameters: parameters and signals in the path or in the obstacles.
+        t: the symbol of time [s] where an obstacle's centre depends on it.
+        name: what people call the problem.
+
+    Returns:
+        the problem, with states ``theta_i`` [rad] and controls [rad/s].
+
+    Raises:
+        ProblemError: for numbers out of range, a path that starts elsewhere than the arm
+            (unless corrected or free) or leaves the workspace, a singular start.
+    """
+    t = ca.SX.sym("t") if t is None else t
+    start = vector(theta0, arm.n, f"{name}: theta0")
+    duration = at_least(horizon, 0.0, f"{name}: horizon", strictly=True)
+    k = at_least(weight, 0.0, f"{name}: weight")
+    gain = at_least(correction, 0.0, f"{name}: correction")
+    _check_choices(name, cost, form)
+    _check_avoidance(name, obstacles, distance_cost, clearance)
+    target = path_position(path, t)
+    task = Task(
+        arm=arm, position=target, t=t, horizon=duration, parameters=tuple(parameters), name=name
+    )
+    task.check(start, must_start_on_path=gain == 0.0 and not free_start)
+
+    theta = ca.SX.sym("theta", arm.n)
+    error = arm.end_effector(theta) - target
+    rate = path_velocity(path, t) - gain * error
+    motion = _motion(arm.jacobian(theta), rate, cost, form)
+    avoidance = k * distance_cost.of(arm, theta, obstacles) if distance_cost else ca.SX(0)
+    constraints = [*motion.task]
+    if velocity_bounds and form == "null-space":
+        limits = velocity_bounds
+        constraints += [Constraint("joint velocity", motion.velocity, limits.lower, limits.upper)]
+    if clearance is not None:
+        distances = [link_distances(arm, theta, disc) for disc in obstacles]
+        constraints += [Constraint("clearance", ca.vertcat(*distances), lower=clearance)]
+    if free_start:
+        constraints += [Constraint("start on path", error, 0.0, 0.0, at="initial")]
+    return OCP(
+        name=name,
+        model=_model(arm, theta, motion, t),
+        x0=start,
+        horizon=duration,
+        running_cost=avoidance + motion.effort,
+        control_bounds=velocity_bounds if velocity_bounds and form == "velocity" else Box(),
+        state_bounds=joint_bounds or Box(),
+        constraints=tuple(constraints),
+        invariants=(Constraint("task error", error, 0.0, 0.0),),
+        parameters=tuple(parameters),
+        smoothness=distance_cost.smoothness if distance_cost and obstacles and k > 0.0 else 2,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A form of the plant: what is controlled, what it does, what it costs, what binds it."""
+
+    control: ca.SX
+    velocity: ca.SX
+    effort: ca.SX
+    task: tuple[Constraint, ...] = ()
+
+
+def _motion(jacobian: ca.SX, rate: ca.SX, cost: Cost, form: Form) -> _Motion:
+    """Return the plant that gives the end effector the velocity ``rate``."""
+    n = jacobian.shape[1]
+    if form == "velocity":
+        v = ca.SX.sym("v", n)
+        return _Motion(
+            control=v,
+            velocity=v,
+            effort=ca.sumsqr(v),
+            task=(Constraint("task", ca.mtimes(jacobian, v) - rate, 0.0, 0.0),),
+        )
+    y = ca.SX.sym("y", n)
+    # J# r' + N y = y + J'(JJ')^-1 (r' - J y): no n x n matrix is formed.
+    missing = rate - ca.mtimes(jacobian, y)
+    velocity = y + ca.mtimes(jacobian.T, _gram_solve(jacobian, missing))
+    if cost == "raw":
+        return _Motion(control=y, velocity=velocity, effort=ca.sumsqr(velocity))
+    # |J# r'|^2 = r'' (JJ')^-1 r', free of y; the rest is y'y exactly.
+    least = ca.dot(rate, _gram_solve(jacobian, rate))
+    return _Motion(control=y, velocity=velocity, effort=least + ca.sumsqr(y))
+
+
+def _gram_solve(jacobian: ca.SX, vector: ca.SX) -> ca.SX:
+    """Return (JJ')^-1 vector (2,), the 2 x 2 inverse in closed form."""
+    first, second = jacobian[0, :], jacobian[1, :]
+    a, b, c = ca.sumsqr(first), ca.dot(first, second), ca.sumsqr(second)
+    adjugate = ca.vertcat(c * vector[0] - b * vector[1], a * vector[1] - b * vector[0])
+    return adjugate / (a * c - b**2)
+
+
+def _model(arm: PlanarArm, theta: ca.SX, motion: _Motion, t: ca.SX) -> Model:
+    return Model(
+        name=f"planar arm, {arm.n} links",
+        x=theta,
+        u=motion.control,
+        f=motion.velocity,
+        t=t,
+        x_units=("rad",) * arm.n,
+        u_units=("rad/s",) * arm.n,
+    )
+
+
+def _check_choices(name: str, cost: Cost, form: Form) -> None:
+    if cost not in ("regularised", "raw"):
+        raise ProblemError(f"{name}: cost = {cost!r}, neither regularised nor raw")
+    if form not in ("null-space", "velocity"):
+        raise ProblemError(f"{name}: form = {form!r}, neither null-space nor velocity")
+
+
+def _check_avoidance(
+    name: str,
+    obstacles: Sequence[Disc],
+    distance_cost: DistanceCost | None,
+    clearance: float | None,
+) -> None:
+    """Refuse obstacles that nothing avoids, and a clearance from nothing."""
+    if clearance is not None:
+        at_least(clearance, 0.0, f"{name}: clearance", strictly=True)
+        if not obstacles:
+            raise ProblemError(f"{name}: a clearance is asked for, but there are no obstacles")
+    elif obstacles and distance_cost is None:
+        raise ProblemError(f"{name}: obstacles need a distance_cost or a clearance to matter")
