@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.constraint import Box, Constraint
+from ocp.expressions import element_names
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -49,8 +50,8 @@ def _lines(ocp: "OCP") -> Iterable[str]:
     for c in ocp.invariants:
         yield from _constraint(c, "kept by the dynamics")
     for entry in ocp.parameters:
-        symbols = ", ".join(str(s) for s in ca.vertsplit(entry.symbol))
-        yield f"    {entry.name} ({symbols}): {type(entry).__name__.lower()}, {_vector(entry.value)}"
+        symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
+        yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
 
 
 def readable(expression: ca.SX) -> str:
@@ -59,7 +60,7 @@ def readable(expression: ca.SX) -> str:
     if len(text) <= _READABLE and "@" not in text:
         return text
     symbols = ", ".join(str(s) for s in ca.symvar(expression))
-    return f"[{expression.n_nodes() if hasattr(expression, 'n_nodes') else len(text)} nodes] of ({symbols})"
+    return f"[{ca.n_nodes(expression)} nodes] of ({symbols})"
 
 
 def _bounds(box: Box, names: tuple[str, ...], units: tuple[str, ...]) -> Iterable[str]:

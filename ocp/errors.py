@@ -9,7 +9,7 @@ class ProblemError(OCPError, ValueError):
     """A description or an input is wrong; the message names symbol, shape and stage."""
 
 
-class UnsupportedProblem(OCPError, TypeError):  # noqa: N818 - the design's name reads as a verdict
+class UnsupportedProblem(OCPError, TypeError):
     """A solver cannot treat this (valid) problem; the message names the term that stops it."""
 
 

@@ -12,7 +12,8 @@ from ocp.errors import ProblemError
 if TYPE_CHECKING:
     from ocp.problem import OCP
 
-Rate = Callable[[ca.SX, ca.SX], ca.SX]
+# Written for SX; MX does as well, where a control law holds a root finder.
+Rate = Callable[[ca.SX, ca.SX | float], ca.SX]
 
 
 @dataclass(frozen=True)
@@ -120,9 +121,9 @@ def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[
     nx, functions = ocp.model.nx, ocp.functions
     if ocp.model.is_discrete:
         now = (s["x"], s["u0"], s["t"], s["p0"])
-        return functions.rate(*now), functions.running_cost(*now)  # type: ignore[return-value]
+        return functions.rate(*now), functions.running_cost(*now)
 
-    def rate(z: ca.SX, fraction: ca.SX) -> ca.SX:
+    def rate(z: ca.SX, fraction: ca.SX | float) -> ca.SX:
         """d(x, cost) over the fraction of the interval, in [0, 1]."""
         u, p = interpolate(s["u0"], s["u1"], fraction), interpolate(s["p0"], s["p1"], fraction)
         now = (z[:nx], u, s["t"] + fraction * s["h"], p)

@@ -61,7 +61,8 @@ class Model:
         for label, units, size in (("x", self.x_units, self.nx), ("u", self.u_units, self.nu)):
             if units and len(units) != size:
                 raise ProblemError(
-                    f"model '{self.name}': {label}_units has {len(units)} entries for {size} symbols"
+                    f"model '{self.name}': {label}_units has {len(units)} entries "
+                    f"for {size} symbols"
                 )
 
     @property

@@ -88,7 +88,7 @@ def _require_regular(ocp: "OCP", h: Hamiltonian) -> None:
     p0 = ocp.parameter_values().at(0.0)[0]
     u0 = ocp.control_bounds.clip(np.zeros(m.nu))
     probes = [np.zeros(m.nx), *np.random.default_rng(0).normal(size=(3, m.nx))]
-    hessians = [np.array(h.control_curvature(ocp.x0, u0, probe, 0.0, p0)) for probe in probes]
+    hessians = [np.array(h.control_curvature(ocp.start(), u0, probe, 0.0, p0)) for probe in probes]
     ranks = [np.linalg.matrix_rank(a, tol=_SINGULAR * (1.0 + np.abs(a).max())) for a in hessians]
     if max(ranks) < m.nu:
         raise UnsupportedProblem(
@@ -112,7 +112,7 @@ def _minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
 
 
 def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
-    """Root in u of the natural residual u - clip(u - H_u), by Newton from the nearest point to 0."""
+    """Root in u of the natural residual u - clip(u - H_u), by Newton from the point nearest 0."""
     m, box = ocp.model, ocp.control_bounds
     u = ca.MX.sym("u", m.nu)
     sizes = (m.nx, m.nx, 1, ocp.p.numel())

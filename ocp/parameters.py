@@ -90,7 +90,8 @@ class Signal:
         width = self.symbol.numel()
         if values.ndim != 2 or values.shape[1] != width or len(values) < 2:
             raise ProblemError(
-                f"signal '{self.name}': samples have shape {values.shape}, (N + 1, {width}) is needed"
+                f"signal '{self.name}': samples have shape {values.shape}, "
+                f"(N + 1, {width}) is needed"
             )
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])

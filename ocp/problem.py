@@ -141,7 +141,9 @@ class OCP:
     @property
     def steps(self) -> int | None:
         """Number of steps of a discrete-time problem, else None."""
-        return int(self.horizon) if self.model.is_discrete else None  # type: ignore[arg-type]
+        if isinstance(self.horizon, FreeTime) or not self.model.is_discrete:
+            return None
+        return int(self.horizon)
 
     def at(self, place: Literal["path", "initial", "terminal"]) -> tuple[Constraint, ...]:
         """Return the constraints of one place."""
@@ -208,7 +210,8 @@ class OCP:
             )
         if self.model.is_discrete and self.horizon != int(self.horizon):
             raise ProblemError(
-                f"{self.name}: horizon = {self.horizon} of a discrete-time model is a number of steps"
+                f"{self.name}: horizon = {self.horizon} of a discrete-time model "
+                "is a number of steps"
             )
 
     def _check_symbols(self) -> None:
@@ -221,8 +224,8 @@ class OCP:
             )
         model.refuse_foreign_symbols(p)
         everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
-        refuse_foreign_symbols(self.running_cost, everywhere, f"{self.name}: running_cost")  # type: ignore[arg-type]
-        refuse_foreign_symbols(self.terminal_cost, at_ends, f"{self.name}: terminal_cost")  # type: ignore[arg-type]
+        refuse_foreign_symbols(ca.SX(self.running_cost), everywhere, f"{self.name}: running_cost")
+        refuse_foreign_symbols(ca.SX(self.terminal_cost), at_ends, f"{self.name}: terminal_cost")
         for c in self.constraints:
             allowed = everywhere if c.at == "path" else at_ends
             refuse_foreign_symbols(
@@ -235,19 +238,19 @@ class OCP:
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
-        self.start()
+        x0 = self.start()
         p = self.parameter_values().at(0.0)[0]
         u = self.control_bounds.clip(np.zeros(self.model.nu))
         functions = self.functions
         for what, value in (
-            ("dynamics f", functions.rate(self.x0, u, 0.0, p)),
-            ("running_cost", functions.running_cost(self.x0, u, 0.0, p)),
-            ("terminal_cost", functions.terminal_cost(self.x0, 0.0, p)),
-            ("constraints", functions.path(self.x0, u, 0.0, p)),
+            ("dynamics f", functions.rate(x0, u, 0.0, p)),
+            ("running_cost", functions.running_cost(x0, u, 0.0, p)),
+            ("terminal_cost", functions.terminal_cost(x0, 0.0, p)),
+            ("constraints", functions.path(x0, u, 0.0, p)),
         ):
             row = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
             if row.size:
                 raise ProblemError(
-                    f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {self.x0}, u = {u}: "
+                    f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {x0}, u = {u}: "
                     "a singular start, or NaN in the data"
                 )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -129,9 +129,9 @@ class Solution:
             raise SolverError(f"{self.solver}: {self.status.value}. {self.message}".strip())
         return self
 
-    def with_(self, **changes: object) -> "Solution":
+    def with_(self, **changes: Any) -> "Solution":
         """Return a copy with some fields replaced."""
-        return replace(self, **changes)  # type: ignore[arg-type]
+        return replace(self, **changes)
 
     # -- between the nodes ----------------------------------------------------------
 
@@ -180,16 +180,15 @@ class Solution:
     def save(self, path: str | Path) -> Path:
         """Write everything but the problem to one ``.npz`` file and return its path."""
         path = Path(path).with_suffix(".npz")
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        scalars = {name: getattr(self, name) for name in _SCALARS}
-        nested = {
+        content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
+        content |= {
             f"{group}/{key}": value
             for group in ("history", "parameters")
             for key, value in getattr(self, group).items()
         }
-        work = {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
-        identity = {"status": self.status.name, "problem": self.problem.name}
-        np.savez_compressed(path, **arrays, **scalars, **nested, **work, **identity)
+        content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
+        content |= {"status": self.status.name, "problem": self.problem.name}
+        np.savez_compressed(path, **content)
         return path
 
     @classmethod
@@ -236,4 +235,4 @@ _SCALARS = {
 
 
 def _interpolate(t: ArrayLike, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(t, nodes, c) for c in rows.T], axis=-1)
+    return np.stack([np.interp(np.asarray(t, dtype=float), nodes, c) for c in rows.T], axis=-1)

@@ -6,17 +6,26 @@ from enum import Enum
 class Status(Enum):
     """The outcome of a solve; only the first two stand behind the trajectory."""
 
+    #: Success: a certified local minimum.
     SOLVED = "a local minimum: the optimality conditions hold, and so does the second-order test"
+    #: Success: a zero of the necessary conditions.
     STATIONARY = "the first-order conditions hold; whether it is a minimum is not known: polish it"
+    #: The thesis' second termination condition.
     SMALL_DECREASE = (
         "stopped because the cost fell too little in one step; it need not be a minimum: "
         "tighten the threshold or use a line search"
     )
+    #: The thesis' third termination condition.
     COST_ROSE = "stopped because the cost rose; the best iterate is returned: take a smaller step"
+    #: Stopped before the tolerance was met.
     ITERATION_LIMIT = "not converged within the iteration limit: raise it or start closer"
+    #: A line search or a damped Newton step came to nothing.
     NO_PROGRESS = "no step improves the iterate: start closer, use continuation or a direct method"
+    #: A number that is not finite, or iterates without bound.
     DIVERGED = "the iterates blew up: start closer, or use continuation or more segments"
+    #: The message names the constraint, and when.
     INFEASIBLE = "no trajectory near this one meets the constraints: relax the one that is named"
+    #: Anything else.
     FAILED = "the numerical backend stopped for another reason, which the message gives"
 
     @property

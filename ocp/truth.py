@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -174,7 +175,7 @@ def _roll_extremal(
     machine = _machine(solution.problem, True)
     roll = machine.step.mapaccum("roll", len(fine) - 1, 2)
     inputs = [ca.DM(a.T) for a in (restart, z_node, *schedule)]
-    x, z, costs, inner, u_start, u_end = roll(start, z_node[0], *inputs)
+    x, _, costs, inner, u_start, u_end = roll(start, z_node[0], *inputs)
     states = np.vstack([start, np.array(x).T])
     total = float(np.sum(np.array(costs)))
     return states, total, np.array(u_start).T, np.array(u_end).T, np.array(inner).T
@@ -204,7 +205,7 @@ def _extremal_machine(ocp: OCP) -> _Machine:
     p0, p1, costate = kind.sym("p0", n_p), kind.sym("p1", n_p), kind.sym("costate", nx)
     begin = kind.sym("begin", 2 * nx)
 
-    def rate(y, s):  # noqa: ANN001, ANN202 - SX or MX, as the control is closed or implicit
+    def rate(y: Any, s: Any) -> Any:  # SX or MX, as the control is closed or implicit
         """d(x, cost, z)/ds; the control is that of z, not of x."""
         inner, at, p = y[nx + 1 :], t + s * h, interpolate(p0, p1, s)
         u = optimality.control(inner[:nx], inner[nx:], at, p)
