@@ -27,11 +27,7 @@ def _lines(ocp: "OCP") -> Iterable[str]:
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
     yield f"{ocp.name}   ({m.name}: {m.nx} states, {m.nu} controls)"
     yield ""
-    stage = (
-        f"sum k=0..{int(ocp.duration / (m.dt or 1)) - 1:d} of L"
-        if discrete
-        else f"int 0..{tf} L dt"
-    )
+    stage = f"sum k=0..{ocp.steps - 1} of L" if ocp.steps is not None else f"int 0..{tf} L dt"
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
     yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
     yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"
@@ -42,7 +38,7 @@ def _lines(ocp: "OCP") -> Iterable[str]:
     if ocp.has_free_time:
         box = ocp.time_box
         yield f"    {_between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"
-    yield f"    x({'0'}) = {_vector(ocp.x0)}" + ("   (guess)" if ocp.has_free_start else "")
+    yield f"    x(0) = {_vector(ocp.x0)}" + ("   (guess)" if ocp.has_free_start else "")
     yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
     yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
     for c in ocp.constraints:
