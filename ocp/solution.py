@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
 
 from ocp.data import Data
 from ocp.errors import ProblemError, SolverError
@@ -136,15 +139,22 @@ class Solution:
     # -- between the nodes ----------------------------------------------------------
 
     def state(self, t: ArrayLike) -> np.ndarray:
-        """Return the state at time(s) t [s], (nx,) or (len(t), nx), interpolated linearly."""
-        return _interpolate(t, self.t, self.x)
+        """Return the state at time(s) t [s], (nx,) or (len(t), nx).
+
+        Interpolated linearly; for an extremal by cubics with the slopes of its canonical flow.
+        """
+        return self._state_and_costate(t)[..., : self.problem.model.nx]
 
     def costate_at(self, t: ArrayLike) -> np.ndarray:
-        """Return the costate at time(s) t [s], interpolated linearly."""
-        return _interpolate(t, self.t, self.costate)
+        """Return the costate at time(s) t [s], interpolated as the state is."""
+        return self._state_and_costate(t)[..., self.problem.model.nx :]
 
     def control(self, t: ArrayLike) -> np.ndarray:
-        """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says."""
+        """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says.
+
+        That of an extremal is accurate to O(h^4), h the distance of the nodes, where the
+        signals of the problem are smooth between them.
+        """
         times = np.asarray(t, dtype=float)
         if self.control_kind == "held":
             index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
@@ -169,6 +179,25 @@ class Solution:
             )
         return values
 
+    def _state_and_costate(self, t: ArrayLike) -> np.ndarray:
+        times = np.asarray(t, dtype=float)
+        if self.control_kind == "extremal":
+            return self._cubics(np.clip(times, self.t[0], self.t[-1]))
+        return _interpolate(times, self.t, np.hstack([self.x, self.costate]))
+
+    @cached_property
+    def _cubics(self) -> PPoly:
+        """State and costate of an extremal between its nodes; signals may jump at the nodes."""
+        z, steps = np.hstack([self.x, self.costate]), np.diff(self.t)[:, None]
+        flow = derive(self.problem).flow.map(len(steps))
+        p_start, p_end = self.data.values.on(self.fractions)
+        slope = np.array(flow(z[:-1].T, self.t[None, :-1], p_start.T)).T
+        slope_end = np.array(flow(z[1:].T, self.t[None, 1:], p_end.T)).T
+        secant = np.diff(z, axis=0) / steps
+        square = (3 * secant - 2 * slope - slope_end) / steps
+        cube = (slope + slope_end - 2 * secant) / steps**2
+        return PPoly(np.stack([cube, square, slope, z[:-1]]), self.t)
+
     # -- to look at, to keep --------------------------------------------------------
 
     def plot(self) -> "Figure":
@@ -179,7 +208,8 @@ class Solution:
 
     def save(self, path: str | Path) -> Path:
         """Write everything but the problem to one ``.npz`` file and return its path."""
-        path = Path(path).with_suffix(".npz")
+        path = Path(path)
+        path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             f"{group}/{key}": value
@@ -198,8 +228,11 @@ class Solution:
         Raises:
             ProblemError: if the file belongs to another problem or is no solution.
         """
-        with np.load(path) as file:
-            data = {name: file[name] for name in file.files}
+        try:
+            with np.load(path) as file:
+                data = {name: file[name] for name in file.files}
+        except (ValueError, EOFError, AttributeError, BadZipFile) as error:
+            raise ProblemError(f"{path} is no saved solution: {error}") from error
         missing = {"status", "problem", *_ARRAYS, *_SCALARS} - set(data)
         if missing:
             raise ProblemError(f"{path} is no saved solution: {', '.join(sorted(missing))} missing")
