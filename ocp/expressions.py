@@ -64,21 +64,27 @@ def refuse_foreign_symbols(expression: ca.SX, allowed: Sequence[ca.SX], what: st
         )
 
 
+def numeric(values: ArrayLike, what: str) -> np.ndarray:
+    """Return ``values`` as a new float array, or raise ``ProblemError``."""
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"{what} is not numeric: {values!r}") from error
+
+
 def numbers(values: ArrayLike, size: int, what: str, *, finite: bool = True) -> np.ndarray:
     """Return ``values`` as a read-only float vector (size,); one number is repeated.
 
     Raises:
         ProblemError: on a wrong size, on NaN, and on infinity where ``finite``.
     """
-    try:
-        vector = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"{what} is not numeric: {values!r}") from error
-    vector = np.full(size, float(vector)) if vector.ndim == 0 else vector.reshape(-1).copy()
+    vector = numeric(values, what)
+    vector = np.full(size, float(vector)) if vector.ndim == 0 else vector.reshape(-1)
     if vector.size != size:
         raise ProblemError(f"{what} has {vector.size} entries, {size} are needed")
-    if np.isnan(vector).any() or (finite and not np.isfinite(vector).all()):
-        bad = int(np.flatnonzero(~np.isfinite(vector))[0])
-        raise ProblemError(f"{what}[{bad}] is {vector[bad]}, a finite number is needed")
+    wrong = np.flatnonzero(~np.isfinite(vector) if finite else np.isnan(vector))
+    if wrong.size:
+        needed = "a finite number" if finite else "a number"
+        raise ProblemError(f"{what}[{wrong[0]}] is {vector[wrong[0]]}, {needed} is needed")
     vector.flags.writeable = False
     return vector

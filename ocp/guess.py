@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
+from ocp.expressions import numeric
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,7 +37,7 @@ class Guess:
         value = getattr(self, part)
         if value is None:
             return None
-        rows = np.atleast_2d(np.asarray(value, dtype=float))
+        rows = np.atleast_2d(numeric(value, f"guess: {part}"))
         if rows.ndim != 2 or rows.shape[1] != width:
             raise ProblemError(
                 f"guess: {part} has shape {rows.shape}, ({width},) or (N + 1, {width}) is needed"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
-from ocp.expressions import numbers, require_symbols
+from ocp.expressions import numbers, numeric, require_symbols
 
 # Two grids whose nodes differ by rounding must be taken as the same grid.
 _SAME_NODE = 1e-9
@@ -85,7 +85,7 @@ class Signal:
 
     def checked(self, samples: ArrayLike) -> np.ndarray:
         """Return ``samples`` as (N + 1, m), or raise ``ProblemError``."""
-        values = np.array(samples, dtype=float)
+        values = numeric(samples, f"signal '{self.name}'")
         values = values[:, None] if values.ndim == 1 else values
         width = self.symbol.numel()
         if values.ndim != 2 or values.shape[1] != width or len(values) < 2:
