@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ocp.errors import ProblemError
 from ocp.parameters import ParameterValues
 
 
@@ -20,3 +21,8 @@ class Data:
     x0: np.ndarray
     t0: float
     values: ParameterValues
+
+    def __post_init__(self) -> None:
+        """Refuse an initial time that is not finite."""
+        if not np.isfinite(self.t0):
+            raise ProblemError(f"t0 = {self.t0}, a finite time is needed")

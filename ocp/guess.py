@@ -28,6 +28,11 @@ class Guess:
     costate: ArrayLike | None = None
     duration: float | None = None
 
+    def __post_init__(self) -> None:
+        """Check the duration; the shapes are checked where they are known."""
+        if self.duration is not None and not 0.0 < self.duration < np.inf:
+            raise ProblemError(f"guess: duration = {self.duration}, it must be positive, finite")
+
     def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
         """Return one part at fractions of the horizon, (len(fractions), width), or None.
 

@@ -204,7 +204,8 @@ class OCP:
             if self.model.is_discrete:
                 raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
             return
-        if not isinstance(self.horizon, int | float) or not 0.0 < self.horizon < np.inf:
+        number = isinstance(self.horizon, int | float | np.integer | np.floating)
+        if not number or not 0.0 < self.horizon < np.inf:
             raise ProblemError(
                 f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite"
             )
@@ -238,9 +239,12 @@ class OCP:
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
-        x0 = self.start()
+        model, x0 = self.model, self.start()
+        if self.guess is not None:
+            for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
+                self.guess.sample(part, np.array([0.0]), width)
         p = self.parameter_values().at(0.0)[0]
-        u = self.control_bounds.clip(np.zeros(self.model.nu))
+        u = self.control_bounds.clip(np.zeros(model.nu))
         functions = self.functions
         for what, value in (
             ("dynamics f", functions.rate(x0, u, 0.0, p)),
