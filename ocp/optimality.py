@@ -124,7 +124,9 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     given = ca.vertcat(*inputs)
     root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
     guess = box.clip(np.zeros(m.nu))
-    return ca.Function("control", inputs, [root(guess, given)], _LAW_INPUTS, ["u"])
+    found = root(guess, given)
+    bounded = _clip(found, box) if box.is_active else found  # the root is, up to rounding
+    return ca.Function("control", inputs, [bounded], _LAW_INPUTS, ["u"])
 
 
 def _clip(value: Any, box: Box) -> Any:
