@@ -1,5 +1,7 @@
 """Parameters and signals: what they are worth at any instant."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -11,6 +13,9 @@ from ocp import Parameter, ParameterValues, ProblemError, Signal
 from tests.ocp.problems import integrator, lag
 from tests.tolerances import ROUNDING
 
+# What a type checker would refuse as well.
+MX: Any = ca.MX.sym("m")
+CUBIC: Any = "cubic"
 numbers = st.floats(-10.0, 10.0)
 
 
@@ -95,17 +100,17 @@ def test_values_cannot_be_changed_behind_the_problem() -> None:
         (lambda s: Parameter("p", s, [1.0, np.nan]), r"parameter 'p'\[1\] is nan"),
         (lambda s: Parameter("p", s, [1.0, np.inf]), r"parameter 'p'\[1\] is inf"),
         (lambda s: Parameter("p", 2 * s, 1.0), "parameter 'p' must be a dense column"),
-        (lambda s: Parameter("p", ca.MX.sym("p"), 1.0), "parameter 'p' is a MX"),
+        (lambda s: Parameter("p", MX, 1.0), "parameter 'p' is a MX"),
         (lambda s: Parameter("p", s, "one"), "parameter 'p' is not numeric"),
         (lambda s: Signal("r", s, np.zeros((5, 3))), r"signal 'r': samples have shape \(5, 3\)"),
         (lambda s: Signal("r", s, np.zeros((1, 2))), r"shape \(1, 2\), \(N \+ 1, 2\) is needed"),
         (lambda s: Signal("r", s, np.zeros(4)), r"shape \(4, 1\)"),
         (lambda s: Signal("r", s, np.zeros((2, 2, 2))), r"shape \(2, 2, 2\)"),
         (lambda s: Signal("r", s, [[0, 0], [0, np.nan]]), "signal 'r': sample 1 is not finite"),
-        (lambda s: Signal("r", s, np.zeros((4, 2)), hold="cubic"), "hold = 'cubic'"),
+        (lambda s: Signal("r", s, np.zeros((4, 2)), hold=CUBIC), "hold = 'cubic'"),
         (lambda s: Signal("r", s, [[1.0, 2.0], [3.0]]), "signal 'r'"),
         (lambda s: Signal("r", s, "ramp"), "signal 'r'"),
-        (lambda s: Signal("r", ca.MX.sym("r"), [0.0, 1.0]), "signal 'r' is a MX"),
+        (lambda s: Signal("r", MX, [0.0, 1.0]), "signal 'r' is a MX"),
     ],
 )
 def test_refuses(build, message: str) -> None:
@@ -121,7 +126,7 @@ def test_refuses_names_that_are_not_declared() -> None:
 def test_a_signal_of_a_discrete_problem_has_a_sample_per_node() -> None:
     r = ca.SX.sym("r")
     ocp = lag(parameters=(Signal("r", r, np.zeros(5)),))
-    with pytest.raises(ProblemError, match="signal 'r' has 4 samples; .*4 steps needs 5"):
+    with pytest.raises(ProblemError, match=r"signal 'r' has 4 samples; .*4 steps needs 5"):
         ocp.parameter_values({"r": np.zeros(4)})
     with pytest.raises(ProblemError, match="signal 'r' has 7 samples"):
         lag(parameters=(Signal("r", r, np.zeros(7)),))
