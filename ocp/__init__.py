@@ -15,7 +15,7 @@ from ocp.problem import OCP, FreeTime
 from ocp.solution import Solution, Work
 from ocp.solver import Program, Solver, Start, solve
 from ocp.status import Status
-from ocp.transcription import Transcription
+from ocp.transcription import Row, Transcription
 
 __all__ = [
     "OCP",
@@ -38,6 +38,7 @@ __all__ = [
     "ParameterValues",
     "ProblemError",
     "Program",
+    "Row",
     "Signal",
     "Solution",
     "Solver",

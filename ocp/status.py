@@ -6,8 +6,9 @@ from enum import Enum
 class Status(Enum):
     """The outcome of a solve; only the first two stand behind the trajectory."""
 
-    #: Success: a certified local minimum.
-    SOLVED = "a local minimum: the optimality conditions hold, and so does the second-order test"
+    #: Success, with the second-order conditions: of the nonlinear program for a direct method, of
+    #: the problem itself for a polished extremal.
+    SOLVED = "a local minimum: first- and second-order conditions hold"
     #: Success: a zero of the necessary conditions.
     STATIONARY = "the first-order conditions hold; whether it is a minimum is not known: polish it"
     #: The thesis' second termination condition.
@@ -23,6 +24,11 @@ class Status(Enum):
     NO_PROGRESS = "no step improves the iterate: start closer, use continuation or a direct method"
     #: A number that is not finite, or iterates without bound.
     DIVERGED = "the iterates blew up: start closer, or use continuation or more segments"
+    #: The message says where.
+    INACCURATE = (
+        "the integrator's error is too large for the answer to mean anything: take more "
+        "intervals or more integration steps"
+    )
     #: The message names the constraint, and when.
     INFEASIBLE = "no trajectory near this one meets the constraints: relax the one that is named"
     #: Anything else.

@@ -45,15 +45,11 @@ class Transcription:
         ocp: the problem.
         intervals: number of intervals N; a discrete-time problem brings its own.
         integrator: one-step method of each interval.
-        keep: largest accepted violation of the problem's invariants at the nodes, imposed
-            where it is finite: an optimiser under hard constraints otherwise exploits the
-            integrator's error to leave them.
     """
 
     ocp: OCP
     intervals: int
     integrator: Integrator
-    keep: float = np.inf
 
     # -- layout -----------------------------------------------------------------------
 
@@ -131,7 +127,7 @@ class Transcription:
         ocp = self.ocp
         gap = [Row(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0) for name in ocp.model.x_names]
         gap += [Row("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = _rows(ocp.at("path"), "path") + _rows(self._kept, "path", self.keep)
+        path = _rows(ocp.at("path"), "path")
         on_control = self._depends_on_control
         rows: list[Row] = []
         for k in range(self.n):
@@ -168,12 +164,21 @@ class Transcription:
         left, right = data.values.on(self.fractions)
         return np.concatenate([[data.t0], left.ravel(), right.ravel(), data.values.at(1.0)[0]])
 
-    def worst(self, g: np.ndarray, bounds: dict[str, np.ndarray]) -> tuple[float, Row | None]:
-        """Return the largest violation among the rows of g, and which row it is."""
-        excess = np.maximum(0.0, np.maximum(bounds["lbg"] - g, g - bounds["ubg"]))
-        if not excess.size or not excess.any():
+    def worst(
+        self, w: np.ndarray, g: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> tuple[float, Row | None]:
+        """Return the largest violation of any constraint or state bound, and which it is."""
+        in_g = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
+        in_w = np.maximum(bounds["lbx"] - w, w - bounds["ubx"])
+        if max(in_g.max(initial=0.0), in_w.max(initial=0.0)) <= 0.0:
             return 0.0, None
-        return float(excess.max()), self.rows[int(excess.argmax())]
+        if in_g.max(initial=0.0) >= in_w.max():
+            return float(in_g.max()), self.rows[int(in_g.argmax())]
+        i, size = int(in_w.argmax()), self.nz + self.ocp.model.nu
+        names = [*self.ocp.model.x_names, *["final time"] * int(self.ocp.has_free_time)]
+        names += self.ocp.model.u_names
+        bound = Row(f"bound of {names[i % size]}", "path", i // size, 0.0, 0.0)
+        return float(in_w.max()), bound
 
     # -- costates -----------------------------------------------------------------------
 
@@ -202,14 +207,9 @@ class Transcription:
     def _at(self, place: str) -> np.ndarray:
         return np.array([row.place == place for row in self.rows])
 
-    @property
-    def _kept(self) -> tuple[Constraint, ...]:
-        """The invariants that are imposed."""
-        return self.ocp.invariants if np.isfinite(self.keep) else ()
-
     @cached_property
     def _path(self) -> ca.SX:
-        return stacked((*self.ocp.at("path"), *self._kept))
+        return stacked(self.ocp.at("path"))
 
     @cached_property
     def _depends_on_control(self) -> tuple[bool, ...]:
@@ -234,13 +234,11 @@ class Transcription:
 
 
 def _rows(
-    constraints: tuple[Constraint, ...],
-    place: Literal["path", "initial", "terminal"],
-    slack: float = 0.0,
+    constraints: tuple[Constraint, ...], place: Literal["path", "initial", "terminal"]
 ) -> list[Row]:
-    """Rows of constraints at node 0, their bounds widened by ``slack``."""
+    """Rows of constraints at node 0."""
     return [
-        Row(c.name, place, 0, float(low) - slack, float(high) + slack)
+        Row(c.name, place, 0, float(low), float(high))
         for c in constraints
         for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
     ]

@@ -23,12 +23,12 @@ class Paths:
 
     @property
     def ends(self) -> np.ndarray:
-        """z at the end of each segment, (S, 2 nx)."""
+        """Z at the end of each segment, (S, 2 nx)."""
         return self.z[:, -1]
 
     @property
     def nodes(self) -> np.ndarray:
-        """z at every step of the whole horizon, (S M + 1, 2 nx)."""
+        """Z at every step of the whole horizon, (S M + 1, 2 nx)."""
         return np.vstack([self.z[:, :-1].reshape(-1, self.z.shape[2]), self.z[-1, -1]])
 
 
@@ -235,7 +235,7 @@ def _step(
     fraction, share = kind.sym("fraction"), kind.sym("share")
     p0, p1 = kind.sym("p0", n_p), kind.sym("p1", n_p)
 
-    def rate(y, s):  # noqa: ANN001, ANN202 - SX, or MX where the control is an implicit root
+    def rate(y, s):
         t, p = t0 + duration * (fraction + s * share), interpolate(p0, p1, s)
         u = optimality.control(y[:nx], y[nx : 2 * nx], t, p)
         cost = ocp.functions.running_cost(y[:nx], u, t, p)

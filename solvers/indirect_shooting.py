@@ -116,10 +116,8 @@ class IndirectShooting(Solver):
 
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""
-        if ocp.at("path"):
-            raise UnsupportedProblem(
-                f"{ocp.name}: indirect shooting takes no path constraint ('{ocp.at('path')[0].name}')"
-            )
+        for c in ocp.at("path"):
+            raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no path '{c.name}'")
         if ocp.state_bounds.is_active:
             raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no state bounds")
         per_segment = -(-self.steps // self.segments)

@@ -1,4 +1,4 @@
-"""Schuetz' method: gradient descent on the control trajectory (Algorithm 2), and a sound version."""
+"""Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
