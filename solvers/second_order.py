@@ -55,15 +55,21 @@ def second_order(
     sign = 0.0
     for k in range(len(slopes) - 1, -1, -1):
         plane = _oriented(np.linalg.solve(slopes[k], plane))
-        smallest = np.linalg.svd(plane[:nx], compute_uv=False)[-1]
-        now = float(np.linalg.slogdet(plane[:nx])[0]) if smallest > _SINGULAR else 0.0
-        if now == 0.0 or now * sign < 0.0:
+        now = _orientation(plane[:nx])
+        # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
+        if sign != 0.0 and now != sign:
             t = schedule.t0 + schedule.fractions[k] * duration
             return SecondOrder(False, f"conjugate point near t = {t:.4g} s")
         sign = now
     if ocp.has_free_start:
         return _tangent_curvature(extremals, plane, z[0], mu, schedule)
     return SecondOrder(True)
+
+
+def _orientation(x: np.ndarray) -> float:
+    """Return the sign of det X, 0 where X is singular."""
+    smallest = np.linalg.svd(x, compute_uv=False)[-1]
+    return float(np.linalg.slogdet(x)[0]) if smallest > _SINGULAR else 0.0
 
 
 def _legendre(

@@ -1,0 +1,14 @@
+"""The one problem library: benchmarks and tests take their problems from here."""
+
+from benchmarks.cases.arm import arm_cases, arm_scenario
+from benchmarks.cases.case import Case, Family
+from benchmarks.cases.links import link_cases
+from benchmarks.cases.textbook import TEXTBOOK
+
+
+def all_cases() -> tuple[Case, ...]:
+    """Return every case of every suite."""
+    return (*TEXTBOOK, *arm_cases(), *link_cases())
+
+
+__all__ = ["TEXTBOOK", "Case", "Family", "all_cases", "arm_cases", "arm_scenario", "link_cases"]
