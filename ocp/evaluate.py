@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ocp.constraint import Box, Constraint
 from ocp.functions import stacked
@@ -29,7 +30,7 @@ class Evaluation:
         worst: which one, and when; empty where nothing is violated.
         stationarity: residual of the minimum principle, max over time of
             abs(u - clip(u - H_u)) with the referee's own costates, for a held control
-            averaged over its interval, plus transversality at free ends; None where a path
+            averaged over its interval, and of transversality at free ends; None where a path
             constraint or state bound is active (its multiplier would be needed).
         task_drift: largest violation of the problem's invariants.
         defect: largest distance of the solution's states from the true ones at its nodes.
@@ -173,7 +174,11 @@ def _stationarity(solution: Solution, truth: Truth) -> float | None:
     else:
         controls, slopes = _averaged(solution, truth, g0, g1)
     residual = np.abs(controls - ocp.control_bounds.clip(controls - slopes)).max(initial=0.0)
-    return float(max(residual, at_end, _start_residual(solution, truth, costates[0])))
+    ends = (
+        _start_residual(solution, truth, costates[0]),
+        _time_residual(solution, truth, costates, at_end),
+    )
+    return float(max(residual, *ends))
 
 
 def _path_is_active(solution: Solution, truth: Truth) -> bool:
@@ -225,42 +230,40 @@ def _averaged(
 
 
 def _final_costate(solution: Solution, truth: Truth) -> tuple[np.ndarray, float]:
-    """Return phi_x + psi_x' nu with the best multipliers, and what free time leaves over.
+    """Return phi_x + psi_x' nu, and phi_t + nu' psi_t, with the best multipliers.
 
-    The multipliers of active terminal constraints are fitted to the solution's costate; for
-    a free final time the leftover is abs(H + phi_t + nu' psi_t).
+    Those of active terminal constraints are fitted to the solution's own costate.
     """
     ocp, m = solution.problem, solution.problem.model
-    x, t, p = truth.x[-1], truth.t[-1], _final_p(solution)
-    psi = stacked(ocp.at("terminal"))
+    psi, phi = stacked(ocp.at("terminal")), ca.SX(ocp.terminal_cost)
     ends = ca.Function(
         "ends",
         [m.x, m.t, ocp.p],
-        [
-            psi,
-            ca.gradient(ca.SX(ocp.terminal_cost), m.x),
-            ca.jacobian(psi, m.x),
-            ca.jacobian(ca.SX(ocp.terminal_cost), m.t),
-            ca.jacobian(psi, m.t),
-        ],
+        [psi, *(ca.jacobian(e, s) for e in (phi, psi) for s in (m.x, m.t))],
     )
-    value, phi_x, psi_x, phi_t, psi_t = (np.array(v, dtype=float) for v in ends(x, t, p))
-    active = _active_rows(ocp.at("terminal"), value.ravel())
-    normal = psi_x[active].T
-    nu = np.linalg.lstsq(normal, solution.costate[-1] - phi_x.ravel(), rcond=None)[0]
-    final = phi_x.ravel() + normal @ nu
-    if not ocp.has_free_time:
-        return final, 0.0
-    u = truth.u_end[-1]
-    rate = np.array(ocp.functions.rate(x, u, t, p)).ravel()
-    hamiltonian = float(ocp.functions.running_cost(x, u, t, p)) + final @ rate
-    return final, abs(float(hamiltonian + phi_t.sum() + nu @ psi_t[active].ravel()))
+    answer = ends(truth.x[-1], truth.t[-1], _final_p(solution))
+    value, phi_x, phi_t, psi_x, psi_t = (np.array(v, dtype=float) for v in answer)
+    target = solution.costate[-1] - phi_x.ravel()
+    nu = _multipliers(ocp.at("terminal"), value.ravel(), psi_x, target)
+    return phi_x.ravel() + psi_x.T @ nu, float(phi_t.sum() + nu @ psi_t.ravel())
 
 
-def _active_rows(constraints: tuple[Constraint, ...], value: np.ndarray) -> np.ndarray:
+def _multipliers(
+    constraints: tuple[Constraint, ...], value: np.ndarray, jacobian: np.ndarray, target: np.ndarray
+) -> np.ndarray:
+    """Return the multipliers for which jacobian' nu is nearest to a target.
+
+    0 where inactive, at least 0 at an upper bound, at most 0 at a lower one.
+    """
     lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
     upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
-    return (value <= lower + _ACTIVE) | (value >= upper - _ACTIVE)
+    least = np.where(value <= lower + _ACTIVE, -np.inf, 0.0)
+    most = np.where(value >= upper - _ACTIVE, np.inf, 0.0)
+    nu, active = np.zeros(len(value)), least < most
+    if active.any():
+        signs = (least[active], most[active])
+        nu[active] = lsq_linear(jacobian[active].T, target, signs, method="bvls").x
+    return nu
 
 
 def _start_residual(solution: Solution, truth: Truth, costate: np.ndarray) -> float:
@@ -271,7 +274,30 @@ def _start_residual(solution: Solution, truth: Truth, costate: np.ndarray) -> fl
     c = stacked(ocp.at("initial"))
     function = ca.Function("c", [m.x, m.t, ocp.p], [c, ca.jacobian(c, m.x)])
     value, jacobian = function(truth.x[0], truth.t[0], truth.p_start[0])
-    active = _active_rows(ocp.at("initial"), np.array(value).ravel())
-    normal = np.array(jacobian)[active].T
-    mu = np.linalg.lstsq(normal, costate, rcond=None)[0]
-    return float(np.abs(costate - normal @ mu).max(initial=0.0))
+    normals = np.array(jacobian)
+    mu = _multipliers(ocp.at("initial"), np.array(value).ravel(), normals, -costate)
+    return float(np.abs(costate + normals.T @ mu).max(initial=0.0))
+
+
+def _time_residual(solution: Solution, truth: Truth, costates: np.ndarray, at_end: float) -> float:
+    """Natural residual of the duration T, from dJ/dT for controls that stretch with it.
+
+    With time and signals written as fractions of the horizon,
+    dJ/dT = phi_t + nu' psi_t + mean(H + (t - t0) H_t), which is H(t_f) + phi_t + nu' psi_t
+    along an extremal without signals. By Simpson's rule over pairs of steps.
+    """
+    ocp, steps = solution.problem, len(truth.t) - 1
+    if not ocp.has_free_time:
+        return 0.0
+    h = hamiltonian(ocp)
+    now = [c.T for c in (truth.x[:-1], truth.u_start, costates[:-1], truth.t[:-1, None])]
+    then = [c.T for c in (truth.x[1:], truth.u_end, costates[1:], truth.t[1:, None])]
+    left, right = (
+        np.array(h.value.map(steps)(*at, p.T)).ravel()
+        + (at[3].ravel() - truth.t[0]) * np.array(h.time_slope.map(steps)(*at, p.T)).ravel()
+        for at, p in ((now, truth.p_start), (then, truth.p_end))
+    )
+    mean = (left[::2] + 4.0 * right[::2] + right[1::2]) @ np.diff(truth.t)[::2] / 3.0
+    duration = np.array([solution.duration])
+    slope = mean / solution.duration + at_end
+    return float(np.abs(duration - ocp.time_box.clip(duration - slope))[0])

@@ -33,6 +33,7 @@ class Hamiltonian:
         control_gradient: H_u (nu,).
         control_curvature: H_uu (nu, nu).
         costate_rate: -H_x (nx,).
+        time_slope: H_t, by the time that is written in f and L.
         expressions: the symbolic H_u and H_uu.
     """
 
@@ -40,6 +41,7 @@ class Hamiltonian:
     control_gradient: ca.Function
     control_curvature: ca.Function
     costate_rate: ca.Function
+    time_slope: ca.Function
     expressions: HamiltonianExpressions
 
 
@@ -61,5 +63,6 @@ def hamiltonian(ocp: "OCP") -> Hamiltonian:
         control_gradient=along("control_gradient", gradient),
         control_curvature=along("control_curvature", ca.densify(curvature)),
         costate_rate=along("costate_rate", -ca.densify(ca.gradient(value, m.x))),
+        time_slope=along("time_slope", ca.densify(ca.gradient(value, m.t))),
         expressions=HamiltonianExpressions(costate, gradient, curvature),
     )

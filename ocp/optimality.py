@@ -11,6 +11,7 @@ from ocp.constraint import Box, Constraint
 from ocp.errors import UnsupportedProblem
 from ocp.functions import stacked
 from ocp.hamiltonian import Hamiltonian, hamiltonian
+from ocp.parameters import Signal
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -58,11 +59,17 @@ def derive(ocp: "OCP") -> Optimality:
     Raises:
         UnsupportedProblem: for a discrete-time model, a Hamiltonian that is linear in a
             control (bang-bang or singular arcs) or whose minimiser is not unique, and for
-            terminal or initial inequalities.
+            terminal or initial inequalities, and signals under a free final time.
     """
     if ocp.model.is_discrete:
         raise UnsupportedProblem(
             f"{ocp.name}: the minimum principle here is that of continuous time"
+        )
+    signals = [entry.name for entry in ocp.parameters if isinstance(entry, Signal)]
+    if ocp.has_free_time and signals:
+        raise UnsupportedProblem(
+            f"{ocp.name}: signal '{signals[0]}' stretches with the free final time, which "
+            "H + phi_t = 0 does not know of; use a direct method, or write it as a function of t"
         )
     h = hamiltonian(ocp)
     _require_regular(ocp, h)

@@ -50,6 +50,10 @@ def test_derivatives() -> None:
             -gradient(lambda x: float(h.value(x, U, COSTATE, T, P)), X),
         ),
         (
+            row(h.time_slope, X, U, COSTATE, T, P),
+            gradient(lambda t: float(h.value(X, U, COSTATE, t[0], P)), np.array([T])),
+        ),
+        (
             np.array(h.control_curvature(X, U, COSTATE, T, P)),
             jacobian(lambda u: row(h.control_gradient, X, u, COSTATE, T, P), U),
         ),
@@ -168,6 +172,11 @@ def test_refuses_a_hamiltonian_that_does_not_determine_the_control() -> None:
 def test_refuses_discrete_time() -> None:
     with pytest.raises(UnsupportedProblem, match=r"lag: .* continuous time"):
         derive(lag())
+
+
+def test_refuses_signals_that_stretch_with_the_final_time() -> None:
+    with pytest.raises(UnsupportedProblem, match="signal 'held' stretches with the free final"):
+        derive(pendulum(horizon=FreeTime(guess=1.0)))
 
 
 @pytest.mark.parametrize("at", ["terminal", "initial"])
