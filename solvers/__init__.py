@@ -7,7 +7,7 @@ from solvers.indirect_shooting import (
 )
 from solvers.line_search import Armijo, FixedStep, StepRule
 from solvers.multiple_shooting import MultipleShooting
-from solvers.multistart import multistart
+from solvers.multistart import LocalOptimum, multistart
 from solvers.polish import polish
 from solvers.schuetz import Schuetz
 from solvers.second_order import SecondOrder, second_order
@@ -17,6 +17,7 @@ __all__ = [
     "FixedStep",
     "HorizonContinuation",
     "IndirectShooting",
+    "LocalOptimum",
     "MultipleShooting",
     "ParameterContinuation",
     "Schuetz",

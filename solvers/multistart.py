@@ -1,6 +1,7 @@
 """Many starts, the distinct local optima they lead to."""
 
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 
@@ -52,11 +53,13 @@ def multistart(
     Returns:
         optima with their true costs; empty if no start succeeded.
     """
+    started = perf_counter()
     program = solver.build(ocp)
+    build_time = perf_counter() - started
     guesses = [None, *_random_guesses(ocp, starts - 1, seed, amplitude)]
     found: list[LocalOptimum] = []
     for guess in guesses:
-        solution = program.run(guess=guess)
+        solution = program.run(guess=guess).with_(build_time=build_time)
         if not solution.status.is_success:
             continue
         verdict = evaluate(solution)

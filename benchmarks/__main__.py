@@ -1,0 +1,158 @@
+"""Command line: ``python -m benchmarks list | run | bench``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.cases import Case, all_cases
+from benchmarks.claims import below_reference, claims_of
+from benchmarks.extremes import extremes_table
+from benchmarks.jacobians import jacobian_table
+from benchmarks.methods import Method, Settings, all_methods
+from benchmarks.pictures import bench_picture
+from benchmarks.row import RESULTS, Row
+from benchmarks.sweep import sweep, tasks_of
+from benchmarks.table import table_of
+
+BENCH_CASES = tuple(f"arm-{i:03d}-sum" for i in range(1, 7))
+BENCH_METHODS = (
+    "direct-75",
+    "direct-150",
+    "fatrop-75",
+    "polish",
+    "schuetz",
+    "schuetz-sound",
+    "shooting",
+    "shooting-thesis",
+    "indirect-15",
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code: 0 if every claim that was checked holds."""
+    options = _parser().parse_args(arguments)
+    console = Console(width=None if sys.stdout.isatty() else 140)
+    if options.command == "list":
+        return _list(console)
+    if options.command == "bench":
+        return _bench(console, options.out, options.workers)
+    cases = _chosen(all_cases(), options.case, "case")
+    if options.suite:
+        cases = [case for case in cases if case.suite == options.suite]
+    methods = _chosen(all_methods(), options.solver, "solver")
+    settings = Settings(options.starts, options.seed)
+    return _run(console, cases, methods, settings, options.out, options.workers, options.resume)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="suites, cases and solvers")
+    run = commands.add_parser("run", help="run cases by solvers and print tables")
+    run.add_argument("--suite", choices=sorted({case.suite for case in all_cases()}))
+    run.add_argument(
+        "--case", nargs="+", default=[], metavar="C", help="names, or their beginnings"
+    )
+    run.add_argument("--solver", nargs="+", default=[], metavar="N", help="names from `list`")
+    run.add_argument("--starts", type=_positive, default=10, metavar="K", help="starts")
+    run.add_argument("--seed", type=int, default=0)
+    run.add_argument("--resume", action="store_true", help="keep the rows that are there")
+    bench = commands.add_parser("bench", help="the main job: six scenarios, a table, a picture")
+    for command in (run, bench):
+        command.add_argument("--workers", type=_positive, default=2, metavar="W")
+        command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is not positive")
+    return number
+
+
+def _chosen(available: Sequence, names: Sequence[str], what: str) -> list:
+    """Return what is called by name; a case also by the beginning of its name."""
+    if not names:
+        return list(available)
+    chosen = []
+    for name in names:
+        exact = [entry for entry in available if entry.name == name]
+        similar = [e for e in available if e.name.startswith(name)] if what == "case" else []
+        if not exact and not similar:
+            raise SystemExit(
+                f"no {what} is called '{name}'; `python -m benchmarks list` names them"
+            )
+        chosen += [entry for entry in exact or similar if entry not in chosen]
+    return chosen
+
+
+def _list(console: Console) -> int:
+    table = Table("suite", "cases", "of them with a reference")
+    for suite in dict.fromkeys(case.suite for case in all_cases()):
+        members = [case for case in all_cases() if case.suite == suite]
+        known = sum(case.reference is not None for case in members)
+        names = f"{members[0].name} ... {members[-1].name} ({len(members)})"
+        table.add_row(suite, names, str(known))
+    console.print(table)
+    table = Table("solver", "suites", "runs on cases that declare", "what")
+    for method in all_methods():
+        table.add_row(method.name, " ".join(sorted(method.suites)), method.family, method.about)
+    console.print(table)
+    return 0
+
+
+def _bench(console: Console, out: Path, workers: int) -> int:
+    cases = _chosen(all_cases(), BENCH_CASES, "case")
+    methods = _chosen(all_methods(), BENCH_METHODS, "solver")
+    code = _run(console, cases, methods, Settings(starts=4), out, workers, resume=False)
+    console.print(f"picture: {bench_picture(BENCH_CASES[0], out)}")
+    return code
+
+
+def _run(
+    console: Console,
+    cases: Sequence[Case],
+    methods: Sequence[Method],
+    settings: Settings,
+    out: Path,
+    workers: int,
+    resume: bool,
+) -> int:
+    tasks = tasks_of(cases, methods, settings)
+    if not tasks:
+        console.print("no solver declares these cases: nothing to run")
+        return 2
+    rows = sweep(tasks, out, workers=workers, resume=resume)
+    for suite in dict.fromkeys(row.suite for row in rows):
+        for kind in ("sum", "closest") if suite == "arm" else ("",):
+            here = [row for row in rows if row.suite == suite and row.case.endswith(kind)]
+            if here:
+                console.print(table_of(here, f"{suite} {kind}".strip()))
+    for table in (extremes_table(rows), jacobian_table(rows)):
+        if table is not None:
+            console.print(table)
+    console.print(f"rows: {out / RESULTS}")
+    return _judge(console, rows)
+
+
+def _judge(console: Console, rows: Sequence[Row]) -> int:
+    """Print the claims; return 1 if one fails or a reference is disproved."""
+    claims = claims_of(rows)
+    for claim in claims:
+        console.print(f"{'holds' if claim.holds else 'FAILS'}: {claim.text} ({claim.evidence})")
+    wrong = below_reference(rows)
+    for row in wrong:
+        console.print(
+            f"FAILS: {row.solver} costs {row.gap:.1e} relative less than the reference of "
+            f"{row.case}: the reference is wrong ({row.cost} < {row.reference})"
+        )
+    return int(bool(wrong) or not all(claim.holds for claim in claims))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,125 @@
+"""What the toolkit claims of itself, checked against the rows of a run."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from benchmarks.row import Row
+
+# A referee's cost this far below a reference, relative: the reference is wrong.
+BELOW_REFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence with a number in it, and whether the rows bear it out."""
+
+    text: str
+    holds: bool
+    evidence: str
+
+
+def below_reference(rows: Iterable[Row]) -> tuple[Row, ...]:
+    """Return the rows that cost less than the best known: each disproves its reference."""
+    return tuple(
+        row
+        for row in rows
+        if row.solved and row.gap is not None and row.gap < -BELOW_REFERENCE - _slack(row)
+    )
+
+
+def _slack(row: Row) -> float:
+    """What a trajectory that violates a constraint may gain by it."""
+    return 10.0 * (row.violation or 0.0)
+
+
+def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
+    """Return the claims on the suite ``arm`` that these rows can decide."""
+    every = {name: _of(rows, name) for name in dict.fromkeys(row.solver for row in rows)}
+    found = [
+        _gap_claim(every.get("direct-75", ())),
+        _refinement_claim(every.get("direct-75", ()), every.get("direct-150", ())),
+        _polish_claim(every.get("polish", ())),
+        _basin_claim(every.get("schuetz-sound", ())),
+        _multiple_claim(every.get("indirect-15", ())),
+    ]
+    return tuple(claim for claim in found if claim is not None)
+
+
+def _of(rows: Sequence[Row], solver: str) -> tuple[Row, ...]:
+    """The rows of a method on the arm's smooth cost, where a reference is known."""
+    return tuple(
+        row
+        for row in rows
+        if row.suite == "arm" and row.solver == solver and row.case.endswith("sum")
+    )
+
+
+def _gap_claim(rows: Sequence[Row]) -> Claim | None:
+    if not rows:
+        return None
+    gaps = [_gap(row) for row in rows]
+    return Claim(
+        "direct multiple shooting, 75 intervals: median gap <= 2e-4, all <= 2e-3",
+        median(gaps) <= 2e-4 and max(gaps) <= 2e-3,
+        f"median {median(gaps):.1e}, worst {max(gaps):.1e} over {len(gaps)}",
+    )
+
+
+def _refinement_claim(coarse: Sequence[Row], fine: Sequence[Row]) -> Claim | None:
+    finer = {row.case: _gap(row) for row in fine}
+    ratios = [finer[row.case] / _gap(row) for row in coarse if row.case in finer]
+    if not ratios:
+        return None
+    good = sum(ratio <= 0.35 for ratio in ratios)
+    return Claim(
+        "twice the intervals: gap at most 0.35 of that before on 36 of 40",
+        good >= 0.9 * len(ratios),
+        f"{good} of {len(ratios)}, median ratio {median(ratios):.3f}",
+    )
+
+
+def _polish_claim(rows: Sequence[Row]) -> Claim | None:
+    if not rows:
+        return None
+    good = [
+        row.status == "SOLVED"
+        and abs(_gap(row)) <= 1e-6
+        and row.residual <= 1e-10
+        and row.iterations <= 3
+        for row in rows
+    ]
+    return Claim(
+        "polish: gap within 1e-6, residual <= 1e-10, at most 3 Newton steps, on all",
+        all(good),
+        f"{sum(good)} of {len(good)}; worst gap {max(abs(_gap(row)) for row in rows):.1e}, "
+        f"residual {max(row.residual for row in rows):.1e}, "
+        f"steps {max(row.iterations for row in rows)}",
+    )
+
+
+def _basin_claim(rows: Sequence[Row]) -> Claim | None:
+    if not rows:
+        return None
+    gaps = [abs(row.local_gap) if row.local_gap is not None else float("inf") for row in rows]
+    good = sum(gap <= 1e-3 for gap in gaps)
+    return Claim(
+        "Schuetz with line search: within 1e-3 of the bottom of its own basin on 38 of 40",
+        good >= 0.95 * len(gaps),
+        f"{good} of {len(gaps)}, worst {max(gaps):.1e}",
+    )
+
+
+def _multiple_claim(rows: Sequence[Row]) -> Claim | None:
+    if not rows:
+        return None
+    good = sum(bool(row.optimum) for row in rows)
+    return Claim(
+        "indirect multiple shooting from the direct answer: the optimum on 38 of 40",
+        good >= 0.95 * len(rows),
+        f"{good} of {len(rows)}",
+    )
+
+
+def _gap(row: Row) -> float:
+    return row.gap if row.gap is not None and row.solved else float("inf")

@@ -1,0 +1,57 @@
+"""Rows condensed to a table: one line a method."""
+
+from collections.abc import Callable, Sequence
+from statistics import median
+
+from rich.table import Table
+
+from benchmarks.row import Row
+
+_COLUMNS = (
+    "solver",
+    "runs",
+    "solved",
+    "optimum",
+    "median gap",
+    "worst gap",
+    "violation",
+    "iterations",
+    "build [s]",
+    "solve [s]",
+)
+
+
+def table_of(rows: Sequence[Row], title: str) -> Table:
+    """Return the table of one suite, methods in the order of their first row.
+
+    "solved" counts what the method stands behind and the referee finds feasible; "optimum"
+    those of them within the gap of the reference. Gaps are those of the solved rows.
+    """
+    table = Table(title=title)
+    for column in _COLUMNS:
+        table.add_column(column, justify="left" if column == "solver" else "right", no_wrap=True)
+    for name in dict.fromkeys(row.solver for row in rows):
+        table.add_row(name, *_cells([row for row in rows if row.solver == name]))
+    return table
+
+
+def _cells(rows: Sequence[Row]) -> list[str]:
+    solved = [row for row in rows if row.solved]
+    gaps = [row.gap for row in solved if row.gap is not None]
+    known = [row for row in rows if row.optimum is not None]
+    violations = [row.violation for row in solved if row.violation is not None]
+    return [
+        str(len(rows)),
+        str(len(solved)),
+        f"{sum(bool(row.optimum) for row in known)}/{len(known)}" if known else "-",
+        _number(median, gaps, "{:.1e}"),
+        _number(max, gaps, "{:.1e}"),
+        _number(max, violations, "{:.0e}"),
+        _number(median, [row.iterations for row in rows], "{:.0f}"),
+        _number(median, [row.build_time for row in rows], "{:.3f}"),
+        _number(median, [row.solve_time for row in rows], "{:.3f}"),
+    ]
+
+
+def _number(of: Callable, values: Sequence[float], form: str) -> str:
+    return form.format(of(values)) if values else "-"
