@@ -1,5 +1,6 @@
 """What a solver returns: a trajectory, its costates, and how it was found."""
 
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -93,6 +94,7 @@ class Solution:
         n, m = len(self.t), self.problem.model
         rows = n - 1 if self.control_kind == "held" else n
         for name, shape in (
+            ("t", (n,)),
             ("x", (n, m.nx)),
             ("x0", (m.nx,)),
             ("costate", (n, m.nx)),
@@ -103,6 +105,11 @@ class Solution:
                 raise ProblemError(f"solution: {name} has shape {array.shape}, {shape} is needed")
             if not np.isfinite(array).all():
                 raise ProblemError(f"solution: {name} is not finite")
+        if n < 2 or not (np.diff(self.t) > 0.0).all():
+            raise ProblemError("solution: t does not increase from node to node")
+        for name in ("cost", "residual"):
+            if np.isnan(getattr(self, name)):
+                raise ProblemError(f"solution: {name} is NaN")
 
     def __repr__(self) -> str:
         """Return one line: what was solved, how it ended, what the solver believes it costs."""
@@ -229,9 +236,9 @@ class Solution:
             ProblemError: if the file belongs to another problem or is no solution.
         """
         try:
-            with np.load(path) as file:
+            with Path(path).open("rb") as raw, np.load(raw) as file:
                 data = {name: file[name] for name in file.files}
-        except (ValueError, EOFError, AttributeError, BadZipFile) as error:
+        except (ValueError, TypeError, EOFError, BadZipFile, zlib.error) as error:
             raise ProblemError(f"{path} is no saved solution: {error}") from error
         missing = {"status", "problem", *_ARRAYS, *_SCALARS} - set(data)
         if missing:
@@ -243,6 +250,8 @@ class Solution:
             group, _, key = name.partition("/")
             if key:
                 groups[group][key] = value
+        if str(data["status"]) not in Status.__members__:
+            raise ProblemError(f"{path} is no saved solution: its status is '{data['status']}'")
         return cls(
             problem=problem,
             status=Status[str(data["status"])],
