@@ -16,6 +16,8 @@ from ocp.solution import Solution
 _FEW = 8
 _LEGEND_ROWS = 12
 _POINTS = 600
+# Lines that vary by less are drawn with their bounds, wherever these are.
+_FLAT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +178,9 @@ def _draw(ax: Axes, panel: _Panel) -> None:
 def _draw_bounds(ax: Axes, box: Box, values: np.ndarray, colours: np.ndarray) -> None:
     """Draw bounds that are not far from the lines: grey where shared, else in the line's colour."""
     bounds = np.vstack([np.asarray(box.lower, float), np.asarray(box.upper, float)])
-    span = max(np.ptp(values), 1e-9)
-    near = (bounds > values.min() - 2.0 * span) & (bounds < values.max() + 2.0 * span)
+    span = np.ptp(values)
+    reach = 2.0 * span if span > _FLAT else np.inf
+    near = (bounds > values.min() - reach) & (bounds < values.max() + reach)
     for bound in np.unique(bounds[near]):
         owners = np.flatnonzero((bounds == bound).any(axis=0))
         colour = colours[owners[0]] if len(owners) == 1 else "0.4"
