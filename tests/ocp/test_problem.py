@@ -1,6 +1,7 @@
 """The problem description: what it derives, and every bad input with its message."""
 
 import re
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -195,7 +196,8 @@ def test_data_refuses_an_initial_time_that_is_not_finite(t0: float) -> None:
 
 def test_a_guess_is_sampled_at_any_instants() -> None:
     guess = Guess(x=[[0.0, 0.0], [1.0, 2.0]], u=[3.0])
-    got = guess.sample("x", np.array([0.0, 0.25, 1.0]), 2)
-    np.testing.assert_allclose(got, [[0.0, 0.0], [0.25, 0.5], [1.0, 2.0]])  # type: ignore[arg-type]
-    np.testing.assert_array_equal(guess.sample("u", np.array([0.0, 0.9]), 1), [[3.0], [3.0]])  # type: ignore[arg-type]
+    x: Any = guess.sample("x", np.array([0.0, 0.25, 1.0]), 2)
+    u: Any = guess.sample("u", np.array([0.0, 0.9]), 1)
+    np.testing.assert_allclose(x, [[0.0, 0.0], [0.25, 0.5], [1.0, 2.0]])
+    np.testing.assert_array_equal(u, [[3.0], [3.0]])
     assert guess.sample("costate", np.array([0.0]), 2) is None
