@@ -127,7 +127,7 @@ def _costate_step(ocp: OCP, integrator: Integrator) -> ca.Function:
     }
     s = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
 
-    def rate(costate: ca.SX, back: ca.SX) -> ca.SX:
+    def rate(costate: ca.SX, back: ca.SX | float) -> ca.SX:
         """d(costate) over the fraction of the interval, counted from its end."""
         x = s["x_next"] + back * (s["x"] - s["x_next"])
         p = s["p1"] + back * (s["p0"] - s["p1"])
