@@ -317,6 +317,34 @@ def test_stationarity_counts_the_final_time() -> None:
     assert evaluate(slow).stationarity == pytest.approx(0.5)
 
 
+def test_stationarity_counts_a_cost_of_the_final_time() -> None:
+    """min T^2/2 + int u^2/2, x: 0 -> 1: T = 2^(-1/3), cost T^2/2 + 1/(2 T) (test_optimality)."""
+    base = integrator()
+    m = base.model
+    ocp = OCP(
+        name="reach",
+        model=m,
+        x0=0.0,
+        horizon=FreeTime(guess=1.0, lower=0.1, upper=5.0),
+        running_cost=m.u**2 / 2,
+        terminal_cost=m.t**2 / 2,
+        constraints=(Constraint("end", m.x, 1.0, 1.0, at="terminal"),),
+    )
+    solution = MultipleShooting(intervals=5).build(ocp).run().or_raise()
+    duration = 2.0 ** (-1.0 / 3.0)
+    assert solution.duration == pytest.approx(duration)
+    verdict = evaluate(solution)
+    assert verdict.cost == pytest.approx(duration**2 / 2 + 1 / (2 * duration))
+    assert verdict.stationarity == pytest.approx(0.0, abs=STATIONARY)
+
+
+def test_stationarity_of_a_discrete_trajectory_by_hand() -> None:
+    """2 u_k + l_k+1 with the costates 1.49375, 0.5875, 0.775, 0.15: largest at k = 0."""
+    u = np.array([[0.1], [-0.2], [0.3], [-0.1]])
+    verdict = evaluate(trajectory(lag(), u))
+    assert verdict.stationarity == pytest.approx(2 * 0.1 + 1.49375)
+
+
 @pytest.mark.parametrize("upper", [5.0, 1.0])
 def test_stationarity_knows_signals_that_stretch_and_a_duration_at_its_bound(upper: float) -> None:
     r = ca.SX.sym("r")
