@@ -11,7 +11,7 @@ from models import (
 )
 
 _SMOOTH: frozenset[Family] = frozenset({"direct", "indirect", "polish"})
-_FREE_END: frozenset[Family] = _SMOOTH | {"gradient"}
+_FREE_END: frozenset[Family] = frozenset({"direct", "indirect", "polish", "gradient"})
 _CERTIFIED = "direct and indirect methods agree to 10 digits (docs/references.md)"
 
 TEXTBOOK = (

@@ -63,8 +63,12 @@ def test_tables_have_a_line_for_each_method_and_survive_failures():
         solver="shooting", solved=False, optimum=False, gap=None, cost=None, violation=None
     )
     assert table_of([row(), failed], "arm").row_count == 2
-    assert extremes_table([failed, row(solver="shooting")]).row_count == 1
+    shooting = extremes_table([failed, row(solver="shooting")])
+    assert shooting is not None
+    assert shooting.row_count == 1
     assert extremes_table([row()]) is None
     pair = [row(solver="shooting"), row(solver="shooting-fd", solved=False)]
-    assert jacobian_table(pair).row_count == 1
+    jacobians = jacobian_table(pair)
+    assert jacobians is not None
+    assert jacobians.row_count == 1
     assert jacobian_table([row()]) is None
