@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from statistics import median
 
+from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.row import Row
@@ -18,6 +19,7 @@ _COLUMNS = (
     "iterations",
     "build [s]",
     "solve [s]",
+    "time ratio",
 )
 
 
@@ -25,21 +27,27 @@ def table_of(rows: Sequence[Row], title: str) -> Table:
     """Return the table of one suite, methods in the order of their first row.
 
     "solved" counts what the method stands behind and the referee finds feasible; "optimum"
-    those of them within the gap of the reference. Gaps are those of the solved rows.
+    those of them within the gap of the reference. Gaps are those of the solved rows. Times
+    of one machine say little; "time ratio" is the median, case by case, of the solve time over
+    that of the first method in the same run.
     """
     table = Table(title=title)
     for column in _COLUMNS:
-        table.add_column(column, justify="left" if column == "solver" else "right", no_wrap=True)
+        justify = "left" if column == "solver" else "right"
+        table.add_column(escape(column), justify=justify, no_wrap=True)
+    yardstick = {row.case: row.solve_time for row in rows if row.solver == rows[0].solver}
     for name in dict.fromkeys(row.solver for row in rows):
-        table.add_row(name, *_cells([row for row in rows if row.solver == name]))
+        here = [row for row in rows if row.solver == name]
+        table.add_row(name, *_cells(here, yardstick))
     return table
 
 
-def _cells(rows: Sequence[Row]) -> list[str]:
+def _cells(rows: Sequence[Row], yardstick: dict[str, float]) -> list[str]:
     solved = [row for row in rows if row.solved]
     gaps = [row.gap for row in solved if row.gap is not None]
     known = [row for row in rows if row.optimum is not None]
     violations = [row.violation for row in solved if row.violation is not None]
+    ratios = [row.solve_time / yardstick[row.case] for row in rows if row.case in yardstick]
     return [
         str(len(rows)),
         str(len(solved)),
@@ -50,6 +58,7 @@ def _cells(rows: Sequence[Row]) -> list[str]:
         _number(median, [row.iterations for row in rows], "{:.0f}"),
         _number(median, [row.build_time for row in rows], "{:.3f}"),
         _number(median, [row.solve_time for row in rows], "{:.3f}"),
+        _number(median, ratios, "{:.2f}"),
     ]
 
 
