@@ -21,9 +21,11 @@ class Functions:
         running_cost: L.
         terminal_cost: phi.
         terminal_gradient: phi_x (nx,).
+        terminal_slopes: phi_t, psi_x (m, nx) and psi_t (m,).
         path: path constraints, stacked.
-        initial: initial constraints, stacked.
-        terminal: terminal constraints, stacked.
+        initial: initial constraints c, stacked.
+        initial_slope: c_x (m, nx).
+        terminal: terminal constraints psi, stacked.
         invariants: invariants, stacked; of (x, t, p).
     """
 
@@ -31,8 +33,10 @@ class Functions:
     running_cost: ca.Function
     terminal_cost: ca.Function
     terminal_gradient: ca.Function
+    terminal_slopes: ca.Function
     path: ca.Function
     initial: ca.Function
+    initial_slope: ca.Function
     terminal: ca.Function
     invariants: ca.Function
 
@@ -44,17 +48,21 @@ class Functions:
         def along(name: str, expression: ca.SX) -> ca.Function:
             return ca.Function(name, [m.x, m.u, m.t, p], [expression], ["x", "u", "t", "p"], [name])
 
-        def at_an_end(name: str, expression: ca.SX) -> ca.Function:
-            return ca.Function(name, [m.x, m.t, p], [expression], ["x", "t", "p"], [name])
+        def at_an_end(name: str, *expressions: ca.SX) -> ca.Function:
+            return ca.Function(name, [m.x, m.t, p], [ca.densify(e) for e in expressions])
 
+        c, psi = stacked(ocp.at("initial")), stacked(ocp.at("terminal"))
+        slopes = (ca.gradient(phi, m.t), ca.jacobian(psi, m.x), ca.jacobian(psi, m.t))
         return cls(
             rate=along("rate", m.f),
             running_cost=along("running_cost", ca.SX(ocp.running_cost)),
             terminal_cost=at_an_end("terminal_cost", phi),
-            terminal_gradient=at_an_end("terminal_gradient", ca.densify(ca.gradient(phi, m.x))),
+            terminal_gradient=at_an_end("terminal_gradient", ca.gradient(phi, m.x)),
+            terminal_slopes=at_an_end("terminal_slopes", *slopes),
             path=along("path", stacked(ocp.at("path"))),
-            initial=at_an_end("initial", stacked(ocp.at("initial"))),
-            terminal=at_an_end("terminal", stacked(ocp.at("terminal"))),
+            initial=at_an_end("initial", c),
+            initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
+            terminal=at_an_end("terminal", psi),
             invariants=at_an_end("invariants", stacked(ocp.invariants)),
         )
 

@@ -1,10 +1,11 @@
 """The Hamiltonian of a problem and its derivatives."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import casadi as ca
+
+from ocp.cache import once_per_problem
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -45,7 +46,7 @@ class Hamiltonian:
     expressions: HamiltonianExpressions
 
 
-@lru_cache(maxsize=32)
+@once_per_problem
 def hamiltonian(ocp: "OCP") -> Hamiltonian:
     """Derive the Hamiltonian of a problem; in discrete time f is the next state."""
     m = ocp.model

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -41,13 +41,18 @@ class March:
         while done < total:
             size = min(_LONGEST, 1 << (total - done).bit_length() - 1)
             here = [c[:, done : done + size] for c in columns]
-            outputs = _chain(self, size)(*carried, *here)
+            outputs = self._chain(size)(*carried, *here)
             carried = [outputs[i][:, -1] for i in range(self.carried)]
             pieces.append(outputs)
             done += size
         return [np.hstack([np.array(p[i]) for p in pieces]).T for i in range(self.step.n_out())]
 
+    @cached_property
+    def _chains(self) -> dict[int, ca.Function]:
+        return {}
 
-@lru_cache(maxsize=512)
-def _chain(march: March, size: int) -> ca.Function:
-    return march.step.mapaccum(f"{march.step.name()}_{size}", size, march.carried)
+    def _chain(self, size: int) -> ca.Function:
+        if size not in self._chains:
+            name = f"{self.step.name()}_{size}"
+            self._chains[size] = self.step.mapaccum(name, size, self.carried)
+        return self._chains[size]

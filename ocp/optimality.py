@@ -1,12 +1,12 @@
 """Pontryagin's minimum principle of a problem, derived symbolically, once."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
+from ocp.cache import once_per_problem
 from ocp.constraint import Box, Constraint
 from ocp.errors import UnsupportedProblem
 from ocp.functions import stacked
@@ -52,7 +52,7 @@ class Optimality:
     end: ca.Function
 
 
-@lru_cache(maxsize=32)
+@once_per_problem
 def derive(ocp: "OCP") -> Optimality:
     """Derive the minimum principle of a continuous-time problem.
 
@@ -92,17 +92,29 @@ def _require_regular(ocp: "OCP", h: Hamiltonian) -> None:
                 f"{ocp.name}: the Hamiltonian is linear in the control {name}: its minimum is "
                 "bang-bang or singular; use a direct method"
             )
-    p0 = ocp.parameter_values().at(0.0)[0]
-    u0 = ocp.control_bounds.clip(np.zeros(m.nu))
-    probes = [np.zeros(m.nx), *np.random.default_rng(0).normal(size=(3, m.nx))]
-    hessians = [np.array(h.control_curvature(ocp.start(), u0, probe, 0.0, p0)) for probe in probes]
-    ranks = [np.linalg.matrix_rank(a, tol=_SINGULAR * (1.0 + np.abs(a).max())) for a in hessians]
-    if max(ranks) < m.nu:
+    hessians = _probed_curvatures(ocp, h)
+    scales = [_SINGULAR * (1.0 + np.abs(a).max()) for a in hessians]
+    if all(np.linalg.matrix_rank(a, tol=s) < m.nu for a, s in zip(hessians, scales, strict=True)):
         raise UnsupportedProblem(
             f"{ocp.name}: H_uu is singular, the Hamiltonian does not determine the control; "
             "add the cost of the directions without effect (for a redundant arm: the "
             "regularised running cost)"
         )
+    if all(np.linalg.eigvalsh(a)[0] < -s for a, s in zip(hessians, scales, strict=True)):
+        raise UnsupportedProblem(
+            f"{ocp.name}: H_uu is not positive definite: the Hamiltonian is not convex in the "
+            "control, and a zero of H_u no minimum of it; use a direct method"
+        )
+
+
+def _probed_curvatures(ocp: "OCP", h: Hamiltonian) -> list[np.ndarray]:
+    """H_uu at the start, for no costate and no control and for a few random ones."""
+    m, rng = ocp.model, np.random.default_rng(0)
+    p = ocp.parameter_values().at(0.0)[0]
+    costates = [np.zeros(m.nx), *rng.normal(size=(5, m.nx))]
+    controls = [np.zeros(m.nu), *rng.normal(size=(5, m.nu))]
+    probes = zip(costates, ocp.control_bounds.clip(np.array(controls)), strict=True)
+    return [np.array(h.control_curvature(ocp.start(), u, c, 0.0, p)) for c, u in probes]
 
 
 def _minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:

@@ -193,13 +193,12 @@ class Transcription:
         later = -lam_g[self._at("dynamics")].reshape(self.n, nx)
         first = -lam_x[:nx]
         if initial:
-            jacobian = ca.Function(
-                "c_x",
-                [self.ocp.model.x, self.ocp.model.t, self.ocp.p],
-                [ca.jacobian(stacked(initial), self.ocp.model.x)],
-            )
             p = data.values.at(0.0)[0]
-            first = first - np.array(jacobian(w[:nx], data.t0, p)).T @ lam_g[self._at("initial")]
+            first = (
+                first
+                - np.array(self.ocp.functions.initial_slope(w[:nx], data.t0, p)).T
+                @ lam_g[self._at("initial")]
+            )
         return np.vstack([first, later])
 
     # -- pieces ---------------------------------------------------------------------------

@@ -1,12 +1,12 @@
 """The trajectory that a solution's controls really produce, integrated until it holds still."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from ocp.cache import once_per_problem
 from ocp.integrate import RK4, Stage, interpolate
 from ocp.march import March
 from ocp.optimality import derive, symbol_kind
@@ -93,7 +93,7 @@ def adjoint(
     to the order of the integrator, with no error of its own. For an extremal the gradients
     are zero: its controls have no parameters.
     """
-    machine = _machine(solution.problem, solution.control_kind == "extremal")
+    machine = _machine(solution)
     inputs = _adjoint_inputs(solution, truth)
     costate, g0, g1 = machine.adjoint([final], [array[::-1] for array in inputs])
     return np.vstack([costate[::-1], final]), g0[::-1], g1[::-1]
@@ -154,7 +154,7 @@ def _roll_controls(
     else:
         u = np.stack([np.interp(fine, nodes, c) for c in solution.u.T], axis=1)
         u_start, u_end = u[:-1], u[1:]
-    machine = _machine(solution.problem, False)
+    machine = _machine(solution)
     x, costs = machine.step([start], [u_start, u_end, *schedule])
     return np.vstack([start, x]), float(costs.sum()), u_start, u_end, np.empty((len(u_start), 0))
 
@@ -170,7 +170,7 @@ def _roll_extremal(
     node = np.searchsorted(solution.fractions, fine[:-1] + 1e-12, side="right") - 1
     restart = np.append(True, np.diff(node) > 0).astype(float)[:, None]
     z_node = np.hstack([solution.x, solution.costate])[node]
-    machine = _machine(solution.problem, True)
+    machine = _machine(solution)
     inputs = [restart, z_node, *schedule]
     x, _, costs, inner, u_start, u_end = machine.step([start, z_node[0]], inputs)
     return np.vstack([start, x]), float(costs.sum()), u_start, u_end, inner
@@ -184,14 +184,18 @@ class _Machine:
     adjoint: March
 
 
-@lru_cache(maxsize=64)
-def _machine(ocp: OCP, extremal: bool) -> _Machine:
-    if extremal:
-        return _extremal_machine(ocp)
+def _machine(solution: Solution) -> _Machine:
+    extremal = solution.control_kind == "extremal"
+    return (_extremal_machine if extremal else _control_machine)(solution.problem)
+
+
+@once_per_problem
+def _control_machine(ocp: OCP) -> _Machine:
     stage = Stage.of(ocp, RK4(), held=False)
     return _Machine(step=March(stage.step), adjoint=March(stage.adjoint))
 
 
+@once_per_problem
 def _extremal_machine(ocp: OCP) -> _Machine:
     optimality, functions, nx, n_p = derive(ocp), ocp.functions, ocp.model.nx, ocp.p.numel()
     kind = symbol_kind(optimality.flow)
