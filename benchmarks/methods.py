@@ -166,7 +166,7 @@ def _direct_methods() -> tuple[Method, ...]:
     return (
         _method("direct-75", "direct", suites, _multistart, coarse, "best of the starts"),
         _method("direct-150", "direct", suites, _from_direct(fine), fine, after),
-        _method("fatrop-75", "direct", suites, _from_direct(fatrop), fatrop, after),
+        _method("fatrop-75", "direct", suites, _plain(fatrop), fatrop, "own start"),
         _method("polish", "polish", "arm", _polish(None), extremal, "direct-75 made extremal"),
         _method("polish-1e-10", "polish", "textbook", _polish(1e-10), extremal, "steps doubled"),
     )

@@ -15,6 +15,7 @@ _COLUMNS = (
     "optimum",
     "median gap",
     "worst gap",
+    "own basin",
     "violation",
     "iterations",
     "build [s]",
@@ -27,7 +28,8 @@ def table_of(rows: Sequence[Row], title: str) -> Table:
     """Return the table of one suite, methods in the order of their first row.
 
     "solved" counts what the method stands behind and the referee finds feasible; "optimum"
-    those of them within the gap of the reference. Gaps are those of the solved rows. Times
+    those of them within the gap of the reference. Gaps are those of the solved rows; "own
+    basin" is the median distance, of all rows, from the local optimum below them. Times
     of one machine say little; "time ratio" is the median, case by case, of the solve time over
     that of the first method in the same run.
     """
@@ -54,6 +56,7 @@ def _cells(rows: Sequence[Row], yardstick: dict[str, float]) -> list[str]:
         f"{sum(bool(row.optimum) for row in known)}/{len(known)}" if known else "-",
         _number(median, gaps, "{:.1e}"),
         _number(max, gaps, "{:.1e}"),
+        _number(median, [row.local_gap for row in rows if row.local_gap is not None], "{:.1e}"),
         _number(max, violations, "{:.0e}"),
         _number(median, [row.iterations for row in rows], "{:.0f}"),
         _number(median, [row.build_time for row in rows], "{:.3f}"),
