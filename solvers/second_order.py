@@ -52,24 +52,33 @@ def second_order(
         return legendre
     plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
     slopes, _ = extremals.step_slopes(paths, schedule, duration)
-    sign = 0.0
     for k in range(len(slopes) - 1, -1, -1):
-        plane = _oriented(np.linalg.solve(slopes[k], plane))
-        now = _orientation(plane[:nx])
+        back = np.linalg.inv(slopes[k])
+        before = back @ plane
         # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
-        if sign != 0.0 and now != sign:
+        if _is_regular(plane[:nx]) and _turns_over(plane[:nx], before[:nx], back[:nx, :nx]):
             t = schedule.t0 + schedule.fractions[k] * duration
             return SecondOrder(False, f"conjugate point near t = {t:.4g} s")
-        sign = now
+        plane = _orthonormal(before)
     if ocp.has_free_start:
         return _tangent_curvature(extremals, plane, z[0], mu, schedule)
     return SecondOrder(True)
 
 
-def _orientation(x: np.ndarray) -> float:
-    """Return the sign of det X, 0 where X is singular."""
-    smallest = np.linalg.svd(x, compute_uv=False)[-1]
-    return float(np.linalg.slogdet(x)[0]) if smallest > _SINGULAR else 0.0
+def _is_regular(x: np.ndarray) -> bool:
+    """Whether the columns are independent, in an orthonormal basis of the plane."""
+    return bool(np.linalg.svd(x, compute_uv=False)[-1] > _SINGULAR)
+
+
+def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
+    """Whether X became singular in one step backwards, from ``x`` to ``before``.
+
+    The step is dx = D'(x - B y) with B >= 0, so that X_before = D'(E + B S) X with real
+    eigenvalues of E + B S, all positive exactly where no direction has turned over. Unlike the
+    sign of det X they also tell when two turn over at once.
+    """
+    turned = np.linalg.solve(in_x, before @ np.linalg.inv(x))
+    return bool(np.linalg.eigvals(turned).real.min() <= 0.0)
 
 
 def _legendre(
@@ -102,13 +111,12 @@ def _final_plane(
     )
     conditions = np.hstack([in_z, in_nu])
     _, _, rows = np.linalg.svd(conditions)
-    return _oriented(rows[len(conditions) :, : in_z.shape[1]].T)
+    return _orthonormal(rows[len(conditions) :, : in_z.shape[1]].T)
 
 
-def _oriented(plane: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of the same plane with the same orientation."""
-    q, r = np.linalg.qr(plane)
-    return q * np.sign(np.diag(r))
+def _orthonormal(plane: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the same plane."""
+    return np.linalg.qr(plane)[0]
 
 
 def _tangent_curvature(

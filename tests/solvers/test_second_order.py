@@ -1,0 +1,100 @@
+"""Conjugate points where they are known, and passes on minima."""
+
+import re
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from models import double_integrator_energy, van_der_pol
+from ocp import OCP, Model, Solution, Status, solve
+from solvers import IndirectShooting, MultipleShooting, SecondOrder, polish
+from tests.solvers.problems import (
+    circle_start,
+    oscillator,
+    saturated_transfer,
+    timed_transfer,
+)
+
+STEPS = 300
+
+
+def judged(ocp: OCP, segments: int = 1) -> tuple[Solution, SecondOrder]:
+    program = IndirectShooting(segments=segments, steps=STEPS).build(ocp)
+    solution = program.run()
+    assert solution.status is Status.STATIONARY
+    return solution, program.second_order(solution)
+
+
+@pytest.mark.parametrize("make", [van_der_pol, double_integrator_energy])
+def test_passes_on_a_minimum(make) -> None:
+    _, verdict = judged(make())
+    assert verdict == SecondOrder(True)
+
+
+def test_passes_with_a_saturated_control() -> None:
+    assert judged(saturated_transfer()[0])[1].passed
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+@pytest.mark.parametrize("segments", [1, 4])
+@pytest.mark.parametrize(
+    ("fixed", "before_end", "durations"),
+    [(True, np.pi, (3.0, 3.1, 3.2, 4.0, 7.0)), (False, np.pi / 2, (1.5, 1.55, 1.6, 2.0, 5.0))],
+)
+def test_conjugate_point_of_the_oscillator(
+    size: int, segments: int, fixed: bool, before_end: float, durations: tuple[float, ...]
+) -> None:
+    """One point for all directions at once too: det X does not change its sign there for two."""
+    for duration in durations:
+        _, verdict = judged(oscillator(duration, fixed=fixed, size=size), segments)
+        if duration < before_end:
+            assert verdict.passed
+            continue
+        assert verdict.passed is False
+        match = re.search(r"conjugate point near t = (\S+) s", verdict.reason)
+        assert match
+        # Seen at the first node before it, 300 steps to the horizon.
+        assert float(match[1]) == pytest.approx(duration - before_end, abs=1.1 * duration / STEPS)
+
+
+def test_legendre_fails_where_the_hamiltonian_turns_concave() -> None:
+    """H_uu = 2 (1.001 - t): a control costs nothing to speak of from t = 1.001 on."""
+    t = ca.SX.sym("t")
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    ocp = OCP(
+        name="turning",
+        model=Model(name="turning", x=x, u=u, f=u, t=t),
+        x0=0.0,
+        horizon=2.0,
+        running_cost=(1.001 - t) * u**2 + x**2,
+    )
+    _, verdict = judged(ocp)
+    assert verdict.passed is False
+    assert verdict.reason == "H_uu is not positive definite at t = 1.007 s"
+
+
+def test_start_manifold() -> None:
+    """On the circle the nearest start is a minimum and the farthest is none."""
+    nearest, verdict = judged(circle_start((0.9, 0.1)))
+    assert verdict.passed
+    np.testing.assert_allclose(nearest.x[0], [1.0, 0.0], atol=1e-9)
+    assert nearest.cost == pytest.approx(0.25)
+    farthest, verdict = judged(circle_start((-1.0, 0.0)))
+    assert farthest.cost == pytest.approx(2.25)
+    assert verdict.passed is False
+    assert "start manifold" in verdict.reason
+
+
+def test_free_final_time_is_not_judged() -> None:
+    direct = solve(timed_transfer(), MultipleShooting(40))
+    solution = polish(direct)
+    assert solution.status is Status.STATIONARY
+    assert "free final time" in solution.message
+
+
+def test_polish_says_why_an_extremal_is_no_minimum() -> None:
+    ocp = oscillator(4.0, fixed=True)
+    solution = polish(solve(ocp, IndirectShooting()))
+    assert solution.status is Status.STATIONARY
+    assert "conjugate point" in solution.message
