@@ -114,4 +114,5 @@ def _fractions(damped: bool) -> Iterator[float]:
 def _is_shorter(trial: _Iterate, solve: Solve, d: np.ndarray, fraction: float) -> bool:
     if trial.norm == np.inf:
         return False
-    return bool(np.linalg.norm(solve(trial.r)) <= (1.0 - fraction / 4.0) * np.linalg.norm(d))
+    with np.errstate(over="ignore", invalid="ignore"):  # too long is too long
+        return bool(np.linalg.norm(solve(trial.r)) <= (1.0 - fraction / 4.0) * np.linalg.norm(d))
