@@ -42,6 +42,18 @@ class HorizonContinuation:
 
     first: float = 0.1
 
+    def __post_init__(self) -> None:
+        """Check the share."""
+        if not 0.0 < self.first < 1.0:
+            raise ProblemError(f"continuation: first = {self.first}, it must lie in (0, 1)")
+
+    def check(self, ocp: OCP) -> None:
+        """Refuse a free final time: the optimiser, not the share, then sets the horizon."""
+        if ocp.has_free_time:
+            raise UnsupportedProblem(
+                f"{ocp.name}: no continuation in the horizon where the final time is free"
+            )
+
     def applied(self, data: Data, share: float) -> tuple[Data, float]:
         """Return the data, and the share of the horizon to integrate."""
         return data, share
@@ -61,11 +73,26 @@ class ParameterContinuation:
     easy: ArrayLike
     first: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Check the share."""
+        if not 0.0 <= self.first < 1.0:
+            raise ProblemError(f"continuation: first = {self.first}, it must lie in [0, 1)")
+
+    def check(self, ocp: OCP) -> None:
+        """Refuse a name that the problem does not know, and a value that does not fit."""
+        entries = {entry.name: entry for entry in ocp.parameters}
+        if self.name not in entries:
+            raise ProblemError(
+                f"continuation: '{self.name}' is no parameter of {ocp.name}; "
+                f"it has {', '.join(entries) or 'none'}"
+            )
+        shape, wanted = np.shape(self.easy), np.shape(entries[self.name].value)
+        if shape not in ((), wanted):
+            raise ProblemError(f"continuation: easy has shape {shape}, {wanted} is needed")
+
     def applied(self, data: Data, share: float) -> tuple[Data, float]:
         """Return the data with the parameter moved by ``share``, and the whole horizon."""
         wanted = data.values.as_dict()
-        if self.name not in wanted:
-            raise ProblemError(f"continuation: '{self.name}' is no parameter of the problem")
         easy = np.broadcast_to(np.asarray(self.easy, dtype=float), wanted[self.name].shape)
         moved = {**wanted, self.name: easy + share * (wanted[self.name] - easy)}
         return replace(data, values=ParameterValues.of(data.values.entries, moved)), 1.0
@@ -109,6 +136,10 @@ class IndirectShooting(Solver):
             raise ProblemError(
                 f"indirect shooting needs 1 <= segments <= steps, not {self.segments}, {self.steps}"
             )
+        if self.max_steps < 1 or not (self.tolerance > 0.0 and self.delta > 0.0):
+            raise ProblemError(
+                "indirect shooting needs at least one Newton step, positive tolerance and delta"
+            )
         if self.jacobian not in ("exact", "finite-difference"):
             raise ProblemError(
                 f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
@@ -120,6 +151,8 @@ class IndirectShooting(Solver):
             raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no path '{c.name}'")
         if ocp.state_bounds.is_active:
             raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no state bounds")
+        if self.continuation:
+            self.continuation.check(ocp)
         per_segment = -(-self.steps // self.segments)
         return IndirectShootingProgram(
             self, Extremals.of(ocp, self.segments, per_segment, self.integrator)
@@ -268,8 +301,9 @@ class IndirectShootingProgram(Program):
             ext.ocp.functions.terminal_cost(x[-1], t[-1], schedule.p_last)
         )
         status, message = self._verdict(results)
-        if not all(np.isfinite(a).all() for a in (t, x, costate, u)) or duration <= 0.0:
+        if not all(np.isfinite(a).all() for a in (t, x, costate, u, cost)) or duration <= 0.0:
             status = Status.DIVERGED
+            message = message or "the cost is not finite along the extremal"
             t, x, costate, u = self._still(data)
             cost = np.inf
         return Solution(
