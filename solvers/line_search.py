@@ -114,4 +114,4 @@ def _parabola_minimum(cost: float, slope: float, step: float, cost_there: float)
     bend = cost_there - cost - slope * step
     if not np.isfinite(bend):
         return 0.1 * step
-    return 10.0 * step if bend <= 0.0 else min(10.0 * step, -slope * step**2 / (2.0 * bend))
+    return 10.0 * step if bend <= 0.0 else min(10.0 * step, step * (-slope * step / (2.0 * bend)))

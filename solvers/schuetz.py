@@ -70,6 +70,8 @@ class Schuetz(Solver):
         """Check the options."""
         if self.intervals < 1 or self.max_iterations < 1:
             raise ProblemError("Schuetz needs at least one interval and one iteration")
+        if self.decrease < 0.0 or self.stationarity < 0.0:
+            raise ProblemError("Schuetz: decrease and stationarity must not be negative")
         if self.direction not in ("steepest", "fletcher-reeves", "polak-ribiere"):
             raise ProblemError(f"direction = {self.direction!r} is not known")
         if self.gradient not in ("continuous", "discrete"):
@@ -170,8 +172,9 @@ class SchuetzProgram(Program):
         started = perf_counter()
         data = Data(self.ocp.start(x0), t0, self.ocp.parameter_values(parameters))
         descent = _Descent(self, data, guess or self.ocp.guess)
-        status = descent.descend()
-        best = descent.best
+        with np.errstate(over="ignore", invalid="ignore"):  # a descent may climb to overflow
+            status = descent.descend()
+        best = descent.here if status is Status.STATIONARY else descent.best
         return Solution(
             problem=self.ocp,
             solver=repr(self.solver),
@@ -183,7 +186,7 @@ class SchuetzProgram(Program):
             costate=best.costate,
             u=best.trial.u,
             cost=best.trial.cost,
-            residual=descent.residuals[-1],
+            residual=descent.residual(best),
             iterations=len(descent.costs) - 1,
             work=Work(rollouts=descent.rollouts, jacobians=descent.sweeps),
             history={"cost": np.array(descent.costs), "residual": np.array(descent.residuals)},
@@ -212,7 +215,7 @@ class _Descent:
         self.here = self._completed(self._trial(np.zeros((n, m.nu)) if u is None else u))
         self.best = self.here
         self.costs = [self.here.trial.cost]
-        self.residuals = [self._residual(self.here)]
+        self.residuals = [self.residual(self.here)]
 
     # -- Algorithm 2 -----------------------------------------------------------------------
 
@@ -248,12 +251,14 @@ class _Descent:
     def _move(self, trial: Trial) -> Status | None:
         """Take the trial as the iterate; return the status if a termination test holds."""
         before = self.here.trial.cost
-        if not np.isfinite(trial.cost):
-            self.message = f"after {len(self.costs)} iterations the state blows up"
+        here = self._completed(trial)
+        residual = self.residual(here)
+        if not np.isfinite([trial.cost, residual]).all():
+            self.message = f"after {len(self.costs)} iterations the state or its costate blows up"
             return Status.DIVERGED
-        self.here = self._completed(trial)
+        self.here = here
         self.costs.append(trial.cost)
-        self.residuals.append(self._residual(self.here))
+        self.residuals.append(residual)
         if trial.cost < self.best.trial.cost:
             self.best = self.here
         if trial.cost > before:
@@ -331,7 +336,8 @@ class _Descent:
         )
         return np.where(blocked, 0.0, g)
 
-    def _residual(self, iterate: _Iterate) -> float:
+    def residual(self, iterate: _Iterate) -> float:
+        """Return the largest projected gradient."""
         return float(np.abs(self._free_gradient(iterate)).max(initial=0.0))
 
     def _inner(self, a: np.ndarray, b: np.ndarray) -> float:
