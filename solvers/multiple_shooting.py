@@ -1,8 +1,10 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
 from collections.abc import Mapping
+from contextlib import nullcontext, redirect_stderr
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from io import StringIO
 from time import perf_counter
 from typing import Any, Literal
 
@@ -13,6 +15,7 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     RK4,
+    Box,
     Data,
     Integrator,
     ProblemError,
@@ -31,6 +34,10 @@ from solvers.feasibility import Feasibility
 
 # Beyond this a constraint counts as violated, whatever the backend says about scaled ones.
 _VIOLATED = 1e-6
+# How far a backend that did not move is pushed, relative to 1 + abs(u).
+_KICK = 1e-3
+# What counts as not moving, by the same measure.
+_SAME = 1e-6
 # What the elastic problem leaves over beyond its own tolerance.
 _UNAVOIDABLE = 1e-5
 
@@ -67,6 +74,10 @@ class MultipleShooting(Solver):
             raise ProblemError(
                 f"multiple shooting needs at least one interval, not {self.intervals}"
             )
+        if self.max_iterations < 1 or not (self.tolerance > 0.0 and self.accuracy > 0.0):
+            raise ProblemError(
+                "multiple shooting needs at least one iteration, positive tolerance and accuracy"
+            )
         if self.backend not in _OPTIONS:
             raise ProblemError(f"backend {self.backend!r} is not one of {', '.join(_OPTIONS)}")
 
@@ -77,6 +88,8 @@ class MultipleShooting(Solver):
                 f"{ocp.name}: fatrop takes no inequality at the start; use ipopt"
             )
         transcription = Transcription(ocp, self.intervals, self.integrator)
+        if self.backend == "fatrop":
+            _refuse_too_many_equations(transcription)
         options = _OPTIONS[self.backend](self, transcription)
         nlp = ca.nlpsol("nlp", self.backend, transcription.program, options)
         n, finer = transcription.n, replace(self.integrator, steps=2 * self.integrator.steps)
@@ -114,6 +127,19 @@ _COMMON = {"error_on_fail": False, "show_eval_warnings": False}
 _OPTIONS = {"ipopt": _ipopt, "fatrop": _fatrop}
 
 
+def _refuse_too_many_equations(transcription: Transcription) -> None:
+    """Refuse what fatrop would meet with an assertion of its own, printed by itself."""
+    ocp, n = transcription.ocp, transcription.n
+    for node, unknowns in ((0, transcription.nz + ocp.model.nu), (n, transcription.nz)):
+        rows = [r for r in transcription.rows if r.node == node and r.is_equation]
+        rows = [r for r in rows if r.place in ("path", "initial", "terminal")]
+        if len(rows) > unknowns:
+            raise UnsupportedProblem(
+                f"{ocp.name}: {len(rows)} equations for {unknowns} unknowns at node {node} "
+                f"(the last is '{rows[-1].name}'); fatrop takes no more equations than unknowns"
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class _Answer:
     """What the backend returned, with every number finite."""
@@ -128,6 +154,10 @@ class _Answer:
     @property
     def word(self) -> str:
         return str(self.stats.get("return_status", ""))
+
+    @property
+    def count(self) -> int:
+        return int(self.stats.get("iter_count", 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,10 +195,17 @@ class MultipleShootingProgram(Program):
         w0 = np.clip(tr.join(z, u), bounds["lbx"], bounds["ubx"])
         answer = self._ask(w0, p, bounds)
         status, message = self._verdict(answer, data, bounds)
+        if status is Status.SOLVED and not self._moved(w0, answer):
+            # A backend looks at curvature only where it goes: one that stays on its first
+            # controls takes a maximum or a saddle there for a solution. From a minimum the
+            # second run comes back at once.
+            answer = self._ask(self._kicked(answer, bounds), p, bounds)
+            status, message = self._verdict(answer, data, bounds)
         if status in _MAYBE_INFEASIBLE and (ocp.constraints or ocp.state_bounds.is_active):
             found = self._feasibility.least_violating(w0, bounds, p)
             if found and found[1] > _UNAVOIDABLE:
-                status, message = Status.INFEASIBLE, self._where(answer, data, *found[1:])
+                elastic = replace(answer, w=found[0])
+                status, message = Status.INFEASIBLE, self._where(elastic, data, *found[1:])
             elif found:
                 answer = self._ask(found[0], p, bounds)
                 status, message = self._verdict(answer, data, bounds)
@@ -180,14 +217,31 @@ class MultipleShootingProgram(Program):
 
     def _ask(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> _Answer:
         """Run the backend; if it returns a number that is not finite, return the first iterate."""
-        raw = {k: np.array(v).ravel() for k, v in self.nlp(x0=w0, p=p, **bounds).items()}
+        nothing = np.zeros(len(self.transcription.rows))
+        try:
+            # CasADi warns of multipliers that are not finite, whatever its options say.
+            with nullcontext() if self.solver.verbose else redirect_stderr(StringIO()):
+                raw = {k: np.array(v).ravel() for k, v in self.nlp(x0=w0, p=p, **bounds).items()}
+        except RuntimeError:  # fatrop throws where functions are not finite
+            stats = {"return_status": "it threw an exception", "success": False}
+            return _Answer(w0, np.inf, nothing, np.zeros_like(w0), nothing, stats)
         stats = self.nlp.stats()
         if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
-            nothing = np.zeros(len(self.transcription.rows))
             return _Answer(w0, np.inf, nothing, np.zeros_like(w0), nothing, stats)
         # The interior point may sit outside a bound by rounding; what is returned does not.
         w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
         return _Answer(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
+
+    def _moved(self, w0: np.ndarray, answer: _Answer) -> bool:
+        """Whether any control differs from the first iterate's."""
+        before, after = self.transcription.split(w0)[1], self.transcription.split(answer.w)[1]
+        return bool(np.any(np.abs(after - before) > _SAME * (1.0 + np.abs(before))))
+
+    def _kicked(self, answer: _Answer, bounds: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the unknowns with slightly different controls; the same for the same answer."""
+        z, u = self.transcription.split(answer.w)
+        u = u + _KICK * np.random.default_rng(0).normal(size=u.shape) * (1.0 + np.abs(u))
+        return np.clip(self.transcription.join(z, u), bounds["lbx"], bounds["ubx"])
 
     # -- the first iterate -------------------------------------------------------------------
 
@@ -226,6 +280,9 @@ class MultipleShootingProgram(Program):
         violated = violation > _VIOLATED
         where = self._where(answer, data, violation, row) if violated else ""
         if answer.stats.get("success") and not violated:
+            excess, row = self._start_violation(answer)
+            if excess > _VIOLATED:
+                return Status.INFEASIBLE, self._where(answer, data, excess, row)
             error, node = self._integration_error(answer, data)
             if error <= self.solver.accuracy:
                 return Status.SOLVED, ""
@@ -233,11 +290,22 @@ class MultipleShootingProgram(Program):
             return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t:.4g} s"
         if answer.word in _INFEASIBLE or answer.stats.get("success"):
             return Status.INFEASIBLE, where
-        if answer.word == "Maximum_Iterations_Exceeded":
+        if answer.count >= self.solver.max_iterations:
             return Status.ITERATION_LIMIT, where
         if answer.word == "Diverging_Iterates":
             return Status.DIVERGED, where or "the cost may be unbounded below"
         return Status.FAILED, f"{self.solver.backend} says {answer.word}. {where}".strip()
+
+    def _start_violation(self, answer: _Answer) -> tuple[float, Row | None]:
+        """By how much the given start itself violates a path constraint, which is not imposed."""
+        rows, path = self.transcription.rows, self.transcription.ocp.at("path")
+        here = [i for i, row in enumerate(rows) if row.place == "path" and row.node == 0]
+        if not here:
+            return 0.0, None
+        box = Box(*(np.concatenate([getattr(c, s) for c in path]) for s in ("lower", "upper")))
+        excess = box.excess(answer.g[here])
+        worst = int(excess.argmax())
+        return float(excess[worst]), rows[here[worst]]
 
     def _integration_error(self, answer: _Answer, data: Data) -> tuple[float, int]:
         """By how much half the step moves the end of an interval, relative to 1 + abs(x)."""
@@ -270,7 +338,6 @@ class MultipleShootingProgram(Program):
         tr, stats = self.transcription, answer.stats
         z, u = tr.split(answer.w)
         iterations = stats.get("iterations") or {}
-        count = int(stats.get("iter_count", 0))
         return Solution(
             problem=tr.ocp,
             solver=repr(self.solver),
@@ -283,11 +350,11 @@ class MultipleShootingProgram(Program):
             u=u,
             cost=answer.cost,
             residual=float(iterations["inf_du"][-1]) if iterations else 0.0,
-            iterations=count,
+            iterations=answer.count,
             work=Work(
                 rollouts=int(stats.get("n_call_nlp_g", 0)),
                 jacobians=int(stats.get("n_call_nlp_jac_g", 0)),
-                factorisations=count,
+                factorisations=answer.count,
             ),
             history={
                 "cost": np.array(iterations.get("obj", [])),
