@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import OCP, Guess, Solution, Solver, evaluate
+from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
 
 # Two answers whose true costs agree to this are the same optimum.
 _SAME_COST = 1e-4
@@ -52,7 +52,12 @@ def multistart(
 
     Returns:
         optima with their true costs; empty if no start succeeded.
+
+    Raises:
+        ProblemError: if there is no start.
     """
+    if starts < 1:
+        raise ProblemError(f"multistart needs at least one start, not {starts}")
     started = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - started
@@ -75,7 +80,7 @@ def _random_guesses(ocp: OCP, number: int, seed: int, amplitude: float) -> list[
         half_range = (np.asarray(box.upper, float) - np.asarray(box.lower, float)) / 2.0
     scale = np.where(np.isfinite(half_range), np.minimum(half_range, amplitude), amplitude)
     waves = np.stack([np.ones(51), np.cos(np.pi * np.linspace(0.0, 1.0, 51))])
-    shapes = rng.normal(size=(max(number, 0), 2, nu)) * scale
+    shapes = rng.normal(size=(number, 2, nu)) * scale
     return [Guess(u=waves.T @ shape) for shape in shapes]
 
 

@@ -1,0 +1,78 @@
+"""Many starts: distinct optima, sorted, counted, the same for the same seed."""
+
+import numpy as np
+import pytest
+
+from benchmarks.cases import arm_scenario
+from models import double_integrator_energy, van_der_pol
+from ocp import Box, Constraint, ProblemError, Status, evaluate
+from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart
+from tests.solvers.problems import changed, ends, point
+from tests.tolerances import CERTIFIED
+
+STARTS = 6
+
+
+@pytest.mark.parametrize(
+    ("name", "basins"), [("arm-001", (5.079, 20.722)), ("arm-003", (2.369, 2.920))]
+)
+def test_both_basins(name: str, basins: tuple[float, ...]) -> None:
+    """The costs are those that the case library lists as local minima."""
+    found = multistart(arm_scenario(name).ocp(), MultipleShooting(40), STARTS, 0)
+    costs = [optimum.cost for optimum in found]
+    assert costs == sorted(costs)
+    np.testing.assert_allclose(costs[:2], basins, rtol=2e-3)  # 40 intervals
+    assert sum(optimum.found for optimum in found) == STARTS
+    for optimum in found:
+        assert optimum.solution.status is Status.SOLVED
+        assert evaluate(optimum.solution).cost == pytest.approx(optimum.cost, rel=CERTIFIED)
+
+
+def test_the_seed_decides() -> None:
+    ocp, solver = arm_scenario("arm-003").ocp(), Schuetz.sound(intervals=20)
+    one, again, other = (multistart(ocp, solver, 3, seed) for seed in (1, 1, 2))
+    assert [(o.cost, o.found) for o in one] == [(o.cost, o.found) for o in again]
+    for a, b in zip(one, again, strict=True):
+        np.testing.assert_array_equal(a.solution.u, b.solution.u)
+    assert [o.cost for o in one] != [o.cost for o in other]
+
+
+def test_more_starts_only_append() -> None:
+    """The first start is the problem's own; one optimum however often it is found."""
+    found = multistart(van_der_pol(), Schuetz.sound(intervals=30), 4, 0)
+    assert len(found) == 1
+    assert found[0].found == 4
+    assert multistart(van_der_pol(), Schuetz.sound(intervals=30), 1, 0)[0].found == 1
+
+
+def test_starts_lie_within_the_bounds() -> None:
+    ocp = changed(van_der_pol(), control_bounds=Box(-0.5, 0.1))
+    assert multistart(ocp, MultipleShooting(20), 3, 0)[0].found == 3
+
+
+def test_nothing_found() -> None:
+    ocp = point(control_bounds=Box(-1, 1), constraints=ends(2.0))
+    assert multistart(ocp, MultipleShooting(10), 3, 0) == ()
+
+
+def test_what_the_referee_sees_violated_does_not_count() -> None:
+    """A held control bends the path between two nodes: 1e-9 is more than it can promise."""
+    ocp = point(
+        x0=0.5,
+        constraints=lambda x, u: (
+            Constraint("wall", (x - 0.5) * (x - 0.5) - u, upper=0.2),
+            *ends(0.8)(x, u),
+        ),
+    )
+    assert multistart(ocp, MultipleShooting(5), 1, 0, violation=1.0)
+    assert multistart(ocp, MultipleShooting(5), 1, 0, violation=0.0) == ()
+
+
+def test_any_solver() -> None:
+    found = multistart(double_integrator_energy(), IndirectShooting(), 2, 0)
+    assert found[0].cost == pytest.approx(6.0, rel=CERTIFIED)
+
+
+def test_no_start_is_refused() -> None:
+    with pytest.raises(ProblemError, match="at least one start"):
+        multistart(van_der_pol(), MultipleShooting(5), 0, 0)
