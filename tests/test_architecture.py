@@ -1,0 +1,105 @@
+"""The laws of the house that a machine can check (docs/architecture.md)."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import ocp
+
+ROOT = Path(ocp.__file__).parent.parent
+PACKAGES = ("ocp", "models", "solvers", "benchmarks")
+LIBRARIES = ("ocp", "models", "solvers")
+MAY_IMPORT = {
+    "ocp": set(),
+    "models": {"ocp"},
+    "solvers": {"ocp"},
+    "benchmarks": {"ocp", "models", "solvers"},
+}
+
+
+def sources(*packages: str) -> list[Path]:
+    return sorted(path for package in packages for path in (ROOT / package).rglob("*.py"))
+
+
+def named(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), filename=named(path))
+
+
+def imports(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of everything a file imports, inside functions too."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{named(path)}:{node.lineno}: a relative import"
+            yield node.lineno, node.module or ""
+
+
+every_file = pytest.mark.parametrize("path", sources(*PACKAGES), ids=named)
+library_file = pytest.mark.parametrize("path", sources(*LIBRARIES), ids=named)
+
+
+@every_file
+def test_imports_follow_the_layers_and_enter_by_the_root(path: Path) -> None:
+    own = path.relative_to(ROOT).parts[0]
+    for line, module in imports(path):
+        package, _, inside = module.partition(".")
+        if package not in PACKAGES or package == own:
+            continue
+        where = f"{named(path)}:{line}: {module}"
+        assert package in MAY_IMPORT[own], f"{where}: {own} does not know {package}"
+        assert not inside, f"{where}: across packages import from the package root"
+
+
+@library_file
+def test_libraries_print_nothing(path: Path) -> None:
+    calls = [
+        node.lineno
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "print"
+    ]
+    assert not calls, f"{named(path)}: print in lines {calls}"
+
+
+@every_file
+def test_exceptions_are_named(path: Path) -> None:
+    """A bare or broad except hides the bug beside the failure it is meant for."""
+    broad = {"Exception", "BaseException"}
+    for node in ast.walk(tree(path)):
+        if not isinstance(node, ast.ExceptHandler):
+            continue
+        where = f"{named(path)}:{node.lineno}"
+        assert node.type is not None, f"{where}: bare except"
+        caught = {n.id for n in ast.walk(node.type) if isinstance(n, ast.Name)}
+        assert not caught & broad, f"{where}: except {caught & broad}"
+
+
+@pytest.mark.parametrize("package", LIBRARIES)
+def test_the_root_lists_what_it_offers(package: str) -> None:
+    """``__all__`` is the list: sorted, complete, and nothing else is public."""
+    module = tree(ROOT / package / "__init__.py")
+    offered = [
+        alias.asname or alias.name
+        for node in module.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    ]
+    listed = next(
+        ast.literal_eval(node.value)
+        for node in module.body
+        if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    )
+    assert sorted(offered) == sorted(listed)
+
+
+@every_file
+def test_a_file_says_what_it_is(path: Path) -> None:
+    assert ast.get_docstring(tree(path)), f"{named(path)} has no docstring"
