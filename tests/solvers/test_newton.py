@@ -96,7 +96,7 @@ def test_nan_at_the_start_diverges(damped: bool) -> None:
 
 
 def test_nan_on_the_way() -> None:
-    """The root of sqrt(x) - 1/10 from 1: the plain first step lands at -0.8, half of it does not."""
+    """The root of sqrt(x) - 1/10 from 1: a plain step lands at -0.8, half of it at 0.1."""
 
     def f(x: np.ndarray) -> np.ndarray:
         return np.sqrt(x, where=x >= 0.0, out=np.full_like(x, np.nan)) - 0.1
