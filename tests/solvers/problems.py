@@ -1,6 +1,7 @@
 """Problems that one method needs and the case library does not have; each says why it is there."""
 
 from dataclasses import fields
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -8,36 +9,41 @@ import numpy as np
 from ocp import OCP, Box, Constraint, FreeTime, Model, Parameter, Signal
 
 
-def changed(ocp: OCP, **changes) -> OCP:
+def changed(ocp: OCP, **changes: Any) -> OCP:
     """The same problem with some of its terms replaced."""
-    return OCP(**({f.name: getattr(ocp, f.name) for f in fields(ocp)} | changes))
+    terms: dict[str, Any] = {f.name: getattr(ocp, f.name) for f in fields(ocp)}
+    return OCP(**(terms | changes))
 
 
 def point(**changes) -> OCP:
     """One state, dx/dt = u, cost u^2 from 0 in 1 s; ``x`` and ``u`` are the symbols' names."""
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    given = {
+    given: dict[str, Any] = {
         "name": "point",
         "model": Model(name="point", x=x, u=u, f=u),
         "x0": 0.0,
         "horizon": 1.0,
         "running_cost": u**2,
     }
-    terms = {key: value(x, u) if callable(value) else value for key, value in changes.items()}
+    terms: dict[str, Any] = {
+        key: value(x, u) if callable(value) else value for key, value in changes.items()
+    }
     return OCP(**(given | terms))
 
 
 def moving(f, *, x0: float, **changes) -> OCP:
     """One state with dx/dt = f(x, u)."""
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    given = {
+    given: dict[str, Any] = {
         "name": "moving",
         "model": Model(name="moving", x=x, u=u, f=f(x, u)),
         "x0": x0,
         "horizon": 1.0,
         "running_cost": u**2,
     }
-    terms = {key: value(x, u) if callable(value) else value for key, value in changes.items()}
+    terms: dict[str, Any] = {
+        key: value(x, u) if callable(value) else value for key, value in changes.items()
+    }
     return OCP(**(given | terms))
 
 
@@ -50,7 +56,7 @@ def tracker(**changes) -> OCP:
     """Everything at run time: a gain in the cost, a held drift in f, a linear reference in L."""
     x, u, t = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("t")
     gain, drift, target = ca.SX.sym("gain"), ca.SX.sym("drift"), ca.SX.sym("target")
-    given = {
+    given: dict[str, Any] = {
         "name": "tracker",
         "model": Model(
             name="swing",
@@ -73,7 +79,7 @@ def tracker(**changes) -> OCP:
 
 
 # Values for a second run of the tracker: another number of samples is allowed, too.
-OTHER = {"gain": 5.0, "drift": [-0.3, 0.5, 0.0], "target": [0.3, -0.5, 0.2, 0.1]}
+OTHER: dict[str, Any] = {"gain": 5.0, "drift": [-0.3, 0.5, 0.0], "target": [0.3, -0.5, 0.2, 0.1]}
 
 
 def timed_transfer(**changes) -> OCP:
@@ -84,7 +90,7 @@ def timed_transfer(**changes) -> OCP:
     from H = 0 at t = 0, where v = 0: 1 + u^2/2 - u^2 = 0, u(0) = sqrt 2 = 6/T^2.
     """
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
-    given = {
+    given: dict[str, Any] = {
         "name": "timed transfer",
         "model": Model(name="double integrator", x=x, u=u, f=ca.vertcat(x[1], u)),
         "x0": [0.0, 0.0],
@@ -123,7 +129,7 @@ def saturated_transfer(limit: float = 4.5) -> tuple[OCP, float]:
 def quartic(**changes) -> OCP:
     """H is not quadratic in u: the minimising control is an implicit root."""
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    given = {
+    given: dict[str, Any] = {
         "name": "quartic",
         "model": Model(name="lag", x=x, u=u, f=-x + u),
         "x0": 2.0,

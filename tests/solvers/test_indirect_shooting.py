@@ -1,6 +1,7 @@
 """Indirect shooting: ends, starts, bounds, data at run time, continuation, and what it refuses."""
 
 from collections.abc import Callable
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -102,7 +103,12 @@ def test_explicit_time_parameters_and_signals_at_run_time() -> None:
     """One build, two runs with other data and another start, each as a direct one."""
     shooting, direct = IndirectShooting().build(tracker()), MultipleShooting(180).build(tracker())
     costs = []
-    for run in ({}, {"parameters": OTHER}, {"parameters": OTHER, "x0": [-0.4, 0.6], "t0": 0.7}):
+    runs: tuple[dict[str, Any], ...] = (
+        {},
+        {"parameters": OTHER},
+        {"parameters": OTHER, "x0": [-0.4, 0.6], "t0": 0.7},
+    )
+    for run in runs:
         solution, held = shooting.run(**run), direct.run(**run)
         assert solution.status is Status.STATIONARY
         assert solution.t[0] == run.get("t0", 0.0)

@@ -1,5 +1,7 @@
 """Step rules on functions of one variable."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -57,9 +59,7 @@ def test_armijo_gives_up() -> None:
     rule = Armijo(most=5)
     assert rule.advance(probe_of(lambda s: s, seen), 0.0, -1.0, 1.0) is None
     assert len(seen) == 5
-    assert all(
-        0.1 - 1e-12 <= b / a <= 0.5 + 1e-12 for a, b in zip(seen[:-1], seen[1:], strict=True)
-    )
+    assert all(0.1 - 1e-12 <= b / a <= 0.5 + 1e-12 for a, b in pairwise(seen))
 
 
 def test_armijo_demands_a_share_of_the_slope() -> None:

@@ -1,6 +1,7 @@
 """Newton's method on systems small enough to know what has to happen."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +21,8 @@ def run(f: Function, jacobian: Function, x: list[float], **options) -> NewtonRes
             return lambda r: np.full_like(r, np.nan)
         return lambda r: np.linalg.solve(matrix, r)
 
-    given = {"tolerance": 1e-12, "max_steps": 50, "damped": True} | options
-    return newton(lambda x: (f(x), None), linearise, np.array(x), **given)
+    settings: dict[str, Any] = {"tolerance": 1e-12, "max_steps": 50, "damped": True} | options
+    return newton(lambda x: (f(x), None), linearise, np.array(x), **settings)
 
 
 def circle(x: np.ndarray) -> np.ndarray:

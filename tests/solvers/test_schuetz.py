@@ -1,7 +1,8 @@
-"""Schuetz' method: Algorithm 2's terminations and its climb, its gradient, and the sound version."""
+"""Schuetz' method: Algorithm 2's terminations and climb, its gradient, the sound version."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -80,7 +81,7 @@ def test_a_fixed_step_climbs_with_conjugate_directions_only() -> None:
     Steepest descent (3.65) with the same step stays at the bottom, and finds it.
     """
     ocp = arm_scenario("arm-001").ocp()
-    options = {"step": FixedStep(0.05), "stop_on_rise": False, "decrease": 0.0}
+    options: dict[str, Any] = {"step": FixedStep(0.05), "stop_on_rise": False, "decrease": 0.0}
     climbing = solve(ocp, Schuetz(direction="fletcher-reeves", **options))
     costs = history(climbing)
     assert climbing.status is Status.DIVERGED
@@ -211,7 +212,8 @@ def test_data_change_without_rebuilding() -> None:
         Schuetz.sound(intervals=60).build(tracker()),
         MultipleShooting(60).build(tracker()),
     )
-    for run in ({}, {"parameters": OTHER, "x0": [-0.4, 0.6], "t0": 0.7}):
+    runs: tuple[dict[str, Any], ...] = ({}, {"parameters": OTHER, "x0": [-0.4, 0.6], "t0": 0.7})
+    for run in runs:
         got, expected = program.run(**run), direct.run(**run)
         assert got.status is Status.STATIONARY
         assert got.cost == pytest.approx(expected.cost, rel=CERTIFIED)
