@@ -9,7 +9,9 @@ CITATION = re.compile(r"\[((?:[A-Z][a-z]+)(?:(?:, | & | et al\.)[A-Za-z]*)* \d{4
 
 def test_every_citation_is_listed():
     listed = set(CITATION.findall((ROOT / "docs" / "references.md").read_text(encoding="utf-8")))
-    files = [f for p in ("ocp", "models", "solvers", "benchmarks") for f in (ROOT / p).rglob("*.py")]
+    files = [
+        f for p in ("ocp", "models", "solvers", "benchmarks") for f in (ROOT / p).rglob("*.py")
+    ]
     files += [ROOT / "docs" / "theory.md", ROOT / "README.md"]
     cited = {c: f.name for f in files for c in CITATION.findall(f.read_text(encoding="utf-8"))}
     assert len(cited) > 5
