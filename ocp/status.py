@@ -6,9 +6,9 @@ from enum import Enum
 class Status(Enum):
     """The outcome of a solve; only the first two stand behind the trajectory."""
 
-    #: Success, with the second-order conditions: of the nonlinear program for a direct method, of
-    #: the problem itself for a polished extremal.
-    SOLVED = "a local minimum: first- and second-order conditions hold"
+    #: Success. A direct method has checked curvature where its iterates went, no further; a
+    #: polished extremal has passed the second-order test of the problem itself.
+    SOLVED = "the optimality conditions hold, with curvature as far as the method checks it"
     #: Success: a zero of the necessary conditions.
     STATIONARY = "the first-order conditions hold; whether it is a minimum is not known: polish it"
     #: The thesis' second termination condition.
@@ -32,7 +32,7 @@ class Status(Enum):
     #: The message names the constraint, and when.
     INFEASIBLE = "no trajectory near this one meets the constraints: relax the one that is named"
     #: Anything else.
-    FAILED = "the numerical backend stopped for another reason, which the message gives"
+    FAILED = "no solution for another reason, which the message gives"
 
     @property
     def is_success(self) -> bool:

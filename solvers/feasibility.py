@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import Row, Transcription
+from solvers.backend import Answer
 
 # The cost, scaled by this, only picks one among the least violating trajectories.
 _TIE_BREAK = 1e-4
@@ -63,8 +64,8 @@ class Feasibility:
 
     def least_violating(
         self, w0: np.ndarray, bounds: dict[str, np.ndarray], p: np.ndarray
-    ) -> tuple[np.ndarray, float, Row | None] | None:
-        """Return the unknowns, the violation that is left and where; None if nothing was found.
+    ) -> tuple[Answer, float, Row | None] | None:
+        """Return the answer, the violation that is left and where; None if nothing was found.
 
         Args:
             w0: first iterate.
@@ -85,14 +86,16 @@ class Feasibility:
             lbg=np.concatenate(lbg),
             ubg=np.concatenate(ubg),
         )
-        w = np.array(answer["x"]).ravel()[:-1]
-        if not self._nlp.stats()["success"] or not np.isfinite(w).all():
+        w, stats = np.array(answer["x"]).ravel()[:-1], self._nlp.stats()
+        if not stats["success"] or not np.isfinite(w).all():
             return None
-        g = np.array(self._constraints(w, p)).ravel()
-        violation, row = self.transcription.worst(w, g, bounds)
-        return w, violation, row
+        cost, g = (np.array(value).ravel() for value in self._values(w, p))
+        nothing = np.zeros_like(g)
+        found = Answer(w, float(cost[0]), g, np.zeros_like(w), nothing, stats)
+        return found, *self.transcription.worst(w, g, bounds)
 
     @cached_property
-    def _constraints(self) -> ca.Function:
+    def _values(self) -> ca.Function:
         program = self.transcription.program
-        return ca.Function("g", [program["x"], program["p"]], [program["g"]])
+        inputs, outputs = (program["x"], program["p"]), (program["f"], program["g"])
+        return ca.Function("values", inputs, outputs)

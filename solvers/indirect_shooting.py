@@ -27,9 +27,11 @@ from ocp import (
 )
 from solvers.extremal import Extremals, Paths, Schedule
 from solvers.newton import NewtonResult, Solve, newton
-from solvers.second_order import SecondOrder, second_order
+from solvers.second_order import SecondOrder, concave_at, second_order
 
 _SMALLEST_ADVANCE = 1e-3
+# An eigenvalue of H_uu below minus this is no rounding error.
+_CONCAVE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -306,6 +308,11 @@ class IndirectShootingProgram(Program):
             message = message or "the cost is not finite along the extremal"
             t, x, costate, u = self._still(data)
             cost = np.inf
+        elif status is Status.STATIONARY:
+            concave = concave_at(ext, paths, schedule, duration, below=-_CONCAVE)
+            if concave is not None:
+                status = Status.FAILED
+                message = f"the control is no minimum of the Hamiltonian at t = {concave:.4g} s"
         return Solution(
             problem=ext.ocp,
             solver=repr(self.solver),

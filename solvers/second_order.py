@@ -47,9 +47,9 @@ def second_order(
     if ocp.has_free_time:
         return SecondOrder(None, "the test is not made for a free final time")
     z, mu, nu, duration = extremals.shape.split(v, schedule.duration)
-    legendre = _legendre(extremals, paths, schedule, duration)
-    if not legendre.passed:
-        return legendre
+    concave = concave_at(extremals, paths, schedule, duration)
+    if concave is not None:
+        return SecondOrder(False, f"H_uu is not positive definite at t = {concave:.4g} s")
     plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
     slopes, _ = extremals.step_slopes(paths, schedule, duration)
     for k in range(len(slopes) - 1, -1, -1):
@@ -81,24 +81,24 @@ def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
     return bool(np.linalg.eigvals(turned).real.min() <= 0.0)
 
 
-def _legendre(
-    extremals: Extremals, paths: Paths, schedule: Schedule, duration: float
-) -> SecondOrder:
+def concave_at(
+    extremals: Extremals, paths: Paths, schedule: Schedule, duration: float, below: float = 0.0
+) -> float | None:
+    """Return when H_uu, on the free controls, first has an eigenvalue not above ``below``.
+
+    None if it never does. Along a minimum no eigenvalue is negative (Legendre and Clebsch).
+    """
     t, x, costate, u = extremals.trajectory(paths, schedule, duration)
     p = np.vstack([schedule.p_left, schedule.p_last])
     box, nu = extremals.ocp.control_bounds, u.shape[1]
-    curvature = np.array(
-        extremals.optimality.hamiltonian.control_curvature.map(len(t))(
-            x.T, u.T, costate.T, t[None, :], p.T
-        )
-    )
-    hessians = curvature.T.reshape(len(t), nu, nu)
+    curvature = extremals.optimality.hamiltonian.control_curvature.map(len(t))
+    hessians = np.array(curvature(x.T, u.T, costate.T, t[None, :], p.T)).T.reshape(-1, nu, nu)
     free = (u > np.asarray(box.lower)) & (u < np.asarray(box.upper))
-    for k, hessian in enumerate(hessians):
-        inner = hessian[np.ix_(free[k], free[k])]
-        if inner.size and np.linalg.eigvalsh((inner + inner.T) / 2)[0] <= 0.0:
-            return SecondOrder(False, f"H_uu is not positive definite at t = {t[k]:.4g} s")
-    return SecondOrder(True)
+    for k, (hessian, f) in enumerate(zip(hessians, free, strict=True)):
+        inner = (hessian + hessian.T)[np.ix_(f, f)] / 2.0
+        if inner.size and np.linalg.eigvalsh(inner)[0] <= below:
+            return float(t[k])
+    return None
 
 
 def _final_plane(

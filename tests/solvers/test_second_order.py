@@ -68,7 +68,11 @@ def test_legendre_fails_where_the_hamiltonian_turns_concave() -> None:
         horizon=2.0,
         running_cost=(1.001 - t) * u**2 + x**2,
     )
-    _, verdict = judged(ocp)
+    program = IndirectShooting(segments=1, steps=STEPS).build(ocp)
+    solution = program.run()
+    assert solution.status is Status.FAILED
+    assert solution.message == "the control is no minimum of the Hamiltonian at t = 1.007 s"
+    verdict = program.second_order(solution)
     assert verdict.passed is False
     assert verdict.reason == "H_uu is not positive definite at t = 1.007 s"
 

@@ -1,0 +1,169 @@
+"""The nonlinear programming backends: their options, and answers that are always finite."""
+
+from contextlib import nullcontext, redirect_stderr
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from ocp import ProblemError, Transcription, UnsupportedProblem, Work
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A backend with what a user may set.
+
+    Args:
+        name: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
+        tolerance: of the optimality conditions.
+        max_iterations: limit.
+        verbose: let it print.
+    """
+
+    name: Literal["ipopt", "fatrop"] = "ipopt"
+    tolerance: float = 1e-9
+    max_iterations: int = 300
+    verbose: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        if self.name not in ("ipopt", "fatrop"):
+            raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
+        if self.max_iterations < 1 or not self.tolerance > 0.0:
+            raise ProblemError("a backend needs at least one iteration and a positive tolerance")
+
+    def build(self, transcription: Transcription) -> "Nlp":
+        """Set the backend up for a transcribed problem.
+
+        Raises:
+            UnsupportedProblem: for what fatrop cannot treat.
+        """
+        own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
+        common = {
+            "error_on_fail": False,
+            "show_eval_warnings": False,
+            "print_time": self.verbose,
+            f"{self.name}.print_level": 5 if self.verbose else 0,
+            f"{self.name}.max_iter": self.max_iterations,
+        }
+        function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
+        return Nlp(function, self.verbose)
+
+    def _ipopt(self) -> dict[str, Any]:
+        # IPOPT otherwise returns controls outside their bounds, by up to 1e-8 relative.
+        relax = {"ipopt.bound_relax_factor": 0.0}
+        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax}
+
+    def _fatrop(self, transcription: Transcription) -> dict[str, Any]:
+        _refuse_for_fatrop(transcription)
+        return {
+            "structure_detection": "auto",
+            "equality": [row.is_equation for row in transcription.rows],
+            "fatrop.tolerance": self.tolerance,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A backend that is set up.
+
+    Attributes:
+        function: the ``casadi.nlpsol``.
+        verbose: whether it may print.
+    """
+
+    function: ca.Function
+    verbose: bool
+
+    def solve(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> "Answer":
+        """Run it; where a number comes back that is not finite, return the first iterate.
+
+        Args:
+            w0: first iterate.
+            p: data of the problem.
+            bounds: lbx, ubx, lbg, ubg.
+        """
+        try:
+            # CasADi warns of multipliers that are not finite, whatever its options say.
+            with nullcontext() if self.verbose else redirect_stderr(StringIO()):
+                raw = {
+                    k: np.array(v).ravel() for k, v in self.function(x0=w0, p=p, **bounds).items()
+                }
+        except RuntimeError:  # fatrop throws where functions are not finite
+            stats = {"return_status": "it threw an exception", "success": False}
+            return Answer.nothing(w0, len(bounds["lbg"]), stats)
+        stats = self.function.stats()
+        if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
+            return Answer.nothing(w0, len(bounds["lbg"]), stats)
+        # The interior point may sit outside a bound by rounding; what is returned does not.
+        w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
+        return Answer(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a backend returned, with every number finite but the cost.
+
+    Attributes:
+        w: unknowns, within their bounds.
+        cost: inf where the backend met a number that is not finite.
+        g: constraints.
+        lam_x: multipliers of the bounds.
+        lam_g: multipliers of the constraints.
+        stats: the backend's own words.
+    """
+
+    w: np.ndarray
+    cost: float
+    g: np.ndarray
+    lam_x: np.ndarray
+    lam_g: np.ndarray
+    stats: dict[str, Any]
+
+    @classmethod
+    def nothing(cls, w0: np.ndarray, rows: int, stats: dict[str, Any]) -> "Answer":
+        """Return the first iterate, where the backend has nothing to show."""
+        zeros = np.zeros(rows)
+        return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats)
+
+    @property
+    def success(self) -> bool:
+        """Whether the backend says so."""
+        return bool(self.stats.get("success"))
+
+    @property
+    def word(self) -> str:
+        """How the backend names the end."""
+        return str(self.stats.get("return_status", ""))
+
+    @property
+    def count(self) -> int:
+        """Iterations."""
+        return int(self.stats.get("iter_count", 0))
+
+    @property
+    def work(self) -> Work:
+        """Evaluations and factorisations."""
+        calls = [int(self.stats.get(f"n_call_nlp_{name}", 0)) for name in ("g", "jac_g")]
+        return Work(*calls, factorisations=self.count)
+
+    def history(self, name: str) -> np.ndarray:
+        """Return a quantity per iteration; empty where the backend keeps none."""
+        return np.array((self.stats.get("iterations") or {}).get(name, []))
+
+
+def _refuse_for_fatrop(transcription: Transcription) -> None:
+    """Refuse what fatrop would meet with an assertion of its own, printed by itself."""
+    ocp, n = transcription.ocp, transcription.n
+    if any(not c.is_equation for c in ocp.at("initial")):
+        raise UnsupportedProblem(f"{ocp.name}: fatrop takes no inequality at the start; use ipopt")
+    for node, unknowns in ((0, transcription.nz + ocp.model.nu), (n, transcription.nz)):
+        rows = [r for r in transcription.rows if r.node == node and r.is_equation]
+        rows = [r for r in rows if r.place in ("path", "initial", "terminal")]
+        if len(rows) > unknowns:
+            raise UnsupportedProblem(
+                f"{ocp.name}: {len(rows)} equations for {unknowns} unknowns at node {node} "
+                f"(the last is '{rows[-1].name}'); fatrop takes no more equations than unknowns"
+            )
