@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
+import numpy as np
 
 from ocp.constraint import Constraint
 
@@ -39,6 +40,12 @@ class Functions:
     initial_slope: ca.Function
     terminal: ca.Function
     invariants: ca.Function
+
+    @property
+    def path_on_control(self) -> np.ndarray:
+        """Which path constraints depend on the control, bool (m,)."""
+        structure = np.array(ca.DM(self.path.jac_sparsity(0, 1), 1.0))
+        return structure.sum(axis=1) > 0.0
 
     @classmethod
     def of(cls, ocp: "OCP") -> "Functions":

@@ -18,6 +18,9 @@ from ocp.guess import Guess
 from ocp.model import Model
 from ocp.parameters import Parameter, ParameterValues, Signal
 
+# A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class FreeTime:
@@ -168,7 +171,8 @@ class OCP:
     def start(self, x0: ArrayLike | None = None) -> np.ndarray:
         """Return the start of a run (nx,), checked; the declared one unless given."""
         start = numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
-        outside = np.flatnonzero(self.state_bounds.excess(start))
+        excess = self.state_bounds.excess(start)
+        outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(start)))
         if outside.size and not self.has_free_start:
             i = int(outside[0])
             low, high = (

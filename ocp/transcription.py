@@ -112,7 +112,7 @@ class Transcription:
         )
         if ocp.has_free_time:
             after = ca.vertcat(after, duration)
-        inside = self._inside.map(n)(x[:, :-1], u, t, p_left)
+        inside = ocp.functions.path.map(n)(x[:, :-1], u, t, p_left)
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         by_stage = ca.vertcat(z[:, 1:] - after, inside)
         g = ca.vertcat(
@@ -207,29 +207,15 @@ class Transcription:
         return np.array([row.place == place for row in self.rows])
 
     @cached_property
-    def _path(self) -> ca.SX:
-        return stacked(self.ocp.at("path"))
-
-    @cached_property
     def _depends_on_control(self) -> tuple[bool, ...]:
-        jacobian = ca.jacobian(self._path, self.ocp.model.u)
-        return tuple(jacobian[i, :].nnz() > 0 for i in range(self._path.numel()))
-
-    @cached_property
-    def _inside(self) -> ca.Function:
-        m = self.ocp.model
-        return ca.Function("inside", [m.x, m.u, m.t, self.ocp.p], [self._path])
+        return tuple(bool(b) for b in self.ocp.functions.path_on_control)
 
     @cached_property
     def _last(self) -> ca.Function:
-        m = self.ocp.model
-        rows = [
-            self._path[i] for i, on_control in enumerate(self._depends_on_control) if not on_control
-        ]
-        terminal = stacked(self.ocp.at("terminal"))
-        return ca.Function(
-            "last", [m.x, m.t, self.ocp.p], [ca.vertcat(ca.SX(0, 1), *rows, terminal)]
-        )
+        m, path = self.ocp.model, stacked(self.ocp.at("path"))
+        rows = [path[i] for i, depends in enumerate(self._depends_on_control) if not depends]
+        last = ca.vertcat(ca.SX(0, 1), *rows, stacked(self.ocp.at("terminal")))
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [last])
 
 
 def _rows(

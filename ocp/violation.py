@@ -39,15 +39,23 @@ def drift(solution: Solution, truth: Truth) -> float:
 
 
 def path_values(solution: Solution, truth: Truth) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield path constraints (K, m) and times (K,), at the starts of the steps and at the ends."""
-    if not solution.problem.at("path"):
+    """Yield path constraints (K, m) and times (K,), at the starts of the steps and at the ends.
+
+    In discrete time a control belongs to the start of its step alone: at the ends its
+    constraints are those of the start again.
+    """
+    ocp = solution.problem
+    if not ocp.at("path"):
         return
-    along = solution.problem.functions.path.map(len(truth.t) - 1)
-    for x, u, t, p in (
-        (truth.x[:-1], truth.u_start, truth.t[:-1], truth.p_start),
-        (truth.x[1:], truth.u_end, truth.t[1:], truth.p_end),
-    ):
-        yield np.array(along(x.T, u.T, t[None, :], p.T)).T, t
+    along = ocp.functions.path.map(len(truth.t) - 1)
+    starts = along(truth.x[:-1].T, truth.u_start.T, truth.t[None, :-1], truth.p_start.T)
+    ends = along(truth.x[1:].T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
+    at_start, at_end = np.array(starts).T, np.array(ends).T
+    if ocp.model.is_discrete:
+        on_control = ocp.functions.path_on_control
+        at_end[:, on_control] = at_start[:, on_control]
+    yield at_start, truth.t[:-1]
+    yield at_end, truth.t[1:]
 
 
 def stacked_box(constraints: tuple[Constraint, ...]) -> Box:

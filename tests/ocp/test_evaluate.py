@@ -513,3 +513,21 @@ def test_costates_along_make_any_trajectory_a_start_for_shooting() -> None:
     found = IndirectShooting(segments=5, steps=60).build(ocp).run(guess=start).or_raise()
     direct = MultipleShooting(intervals=60).build(ocp).run(guess=Guess(u=[0.0, 0.0]))
     assert evaluate(found).cost == pytest.approx(evaluate(direct).cost, rel=1e-3)
+
+
+def test_a_discrete_control_meets_its_constraints_at_the_start_of_its_step_only():
+    """x + u >= 1/2 with x+ = x + u: the last control has no constraint with the last state."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    ocp = OCP(
+        name="mixed",
+        model=Model(name="sum", x=x, u=u, f=x + u, dt=1.0),
+        x0=1.0,
+        horizon=2,
+        running_cost=x**2 + u**2,
+        constraints=(Constraint("mixed", ca.vertcat(x + u, x), lower=[0.5, 0.4]),),
+    )
+    controls = np.array([[-0.5], [0.0]])
+    assert evaluate(trajectory(ocp, controls)).violation == 0.0
+    worse = evaluate(trajectory(ocp, np.array([[-0.5], [-0.2]])))
+    assert worse.violation == pytest.approx(0.2)
+    assert "'mixed' at t = 1 s" in worse.worst

@@ -201,3 +201,10 @@ def test_a_guess_is_sampled_at_any_instants() -> None:
     np.testing.assert_allclose(x, [[0.0, 0.0], [0.25, 0.5], [1.0, 2.0]])
     np.testing.assert_array_equal(u, [[3.0], [3.0]])
     assert guess.sample("costate", np.array([0.0]), 2) is None
+
+
+def test_a_start_on_its_bound_may_be_rounded() -> None:
+    bounded = integrator(x0=0.3, state_bounds=Box(-1.0, 0.3))
+    assert bounded.start([0.3 + 1e-12])[0] == 0.3 + 1e-12
+    with pytest.raises(ProblemError, match="outside its bounds"):
+        bounded.start([0.3 + 1e-6])
