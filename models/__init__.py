@@ -8,6 +8,19 @@ from models.double_integrator import (
     double_integrator_energy,
     double_integrator_minimum_time,
 )
+from models.linear import (
+    LinearPlant,
+    lq_regulator,
+    mass_spring_damper,
+    sinusoid,
+    stable_plant,
+    state_space,
+    step_reference,
+    thesis_regulator,
+    thesis_tracking,
+    tracking_ocp,
+    unstable_plant,
+)
 from models.obstacles import Disc, distance_to_segment, link_distances
 from models.oscillators import hypersensitive, rayleigh, van_der_pol
 from models.paths import Path, line, path_position, path_velocity
@@ -22,6 +35,7 @@ __all__ = [
     "Disc",
     "DistanceCost",
     "Form",
+    "LinearPlant",
     "Path",
     "PlanarArm",
     "bryson_denham",
@@ -32,10 +46,20 @@ __all__ = [
     "hypersensitive",
     "line",
     "link_distances",
+    "lq_regulator",
+    "mass_spring_damper",
     "path_position",
     "path_velocity",
     "random_scenarios",
     "rayleigh",
     "redundancy_ocp",
+    "sinusoid",
+    "stable_plant",
+    "state_space",
+    "step_reference",
+    "thesis_regulator",
+    "thesis_tracking",
+    "tracking_ocp",
+    "unstable_plant",
     "van_der_pol",
 ]
