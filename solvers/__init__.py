@@ -1,5 +1,9 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
+from solvers.batch import Batch
+from solvers.bellman import Table
+from solvers.grid import Axis
+from solvers.grid_dp import GridDP
 from solvers.indirect_shooting import (
     HorizonContinuation,
     IndirectShooting,
@@ -9,20 +13,26 @@ from solvers.line_search import Armijo, FixedStep, StepRule
 from solvers.multiple_shooting import MultipleShooting
 from solvers.multistart import LocalOptimum, multistart
 from solvers.polish import polish
+from solvers.riccati import Riccati
 from solvers.schuetz import Schuetz
 from solvers.second_order import SecondOrder, second_order
 
 __all__ = [
     "Armijo",
+    "Axis",
+    "Batch",
     "FixedStep",
+    "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
     "LocalOptimum",
     "MultipleShooting",
     "ParameterContinuation",
+    "Riccati",
     "Schuetz",
     "SecondOrder",
     "StepRule",
+    "Table",
     "multistart",
     "polish",
     "second_order",
