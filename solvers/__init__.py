@@ -10,6 +10,7 @@ from solvers.indirect_shooting import (
     ParameterContinuation,
 )
 from solvers.line_search import Armijo, FixedStep, StepRule
+from solvers.linear_mpc import LinearMPC
 from solvers.multiple_shooting import MultipleShooting
 from solvers.multistart import LocalOptimum, multistart
 from solvers.polish import polish
@@ -25,6 +26,7 @@ __all__ = [
     "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
+    "LinearMPC",
     "LocalOptimum",
     "MultipleShooting",
     "ParameterContinuation",
