@@ -23,7 +23,7 @@ from ocp import (
     linear_quadratic,
 )
 from solvers import recursion
-from solvers.prediction import Prediction
+from solvers.stacked import Prediction
 
 # Above this condition number of H the inputs have fewer than about eight correct digits.
 _ILL_CONDITIONED = 1e8

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ocp import LinearQuadratic, LQData, Matrices
 from solvers import recursion
-from solvers.prediction import Prediction
+from solvers.stacked import Prediction
 
 # A point as (x (N + 1, n), u (N, m)).
 Trajectory = tuple[np.ndarray, np.ndarray]
