@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from qpsolvers.exceptions import QPError
 
 from ocp import ProblemError
-from solvers.quadratic_program import QP, residuals
+from solvers.active_set import ActiveSet
+from solvers.quadratic_program import QP
 
 # What goes wrong inside a backend is its failure, never a sign that it is not installed.
 _INSIDE = (QPError, ArithmeticError, LookupError, RuntimeError, ValueError, TypeError)
@@ -48,40 +49,47 @@ class Backend(ABC):
 class OSQPBackend(Backend):
     """OSQP [Stellato et al. 2020], set up once and warm started from its last answer.
 
-    Polished, so that an answer with the right active set is exact to rounding; it starts with
-    a loose tolerance and goes on, with the same factorisation, only while the residuals are
-    too large.
+    It finds the active rows to a loose tolerance, ``ActiveSet`` makes the answer exact; only
+    where that fails it goes on, with the same factorisation, to tighter ones. Its own polishing
+    is off: it does not correct a wrong guess of the active rows, and it prints.
     """
 
-    _LADDER = (1e-4, 1e-6, 1e-8, 1e-10)
+    _LADDER = (1e-3, 1e-5, 1e-7, 1e-9)
 
     def __init__(self, tolerance: float) -> None:
         """Set nothing up yet."""
         self._tolerance = tolerance
         self._solver: osqp.OSQP | None = None
+        self._refiner: ActiveSet | None = None
         self._h: sp.csc_matrix | None = None
         self._g: sp.csc_matrix | None = None
 
     def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
         """Update what changed, and solve."""
-        factorised = self._prepare(qp)
-        solver = self._solver
+        factorisations = self._prepare(qp)
+        solver, refiner = self._solver, self._refiner
         assert solver is not None
+        assert refiner is not None
         if start is not None:
             solver.warm_start(x=start)
-        iterations, word = 0, ""
-        for i, eps in enumerate(self._LADDER):
+        iterations, word, best = 0, "", None
+        for eps in self._LADDER:
             solver.update_settings(eps_abs=eps, eps_rel=eps)
             result = solver.solve(raise_error=False)
             iterations, word = iterations + int(result.info.iter), str(result.info.status)
             if "infeasible" in word or not np.isfinite(result.x).all():
                 break
-            if max(residuals(qp, result.x, result.y)) <= self._tolerance:
-                return Answer(result.x, result.y, word, iterations, factorised + i + 1)
-        else:
-            return Answer(result.x, result.y, word, iterations, factorised + i + 1)
-        self._solver = None  # the iterates of an infeasible program are a bad warm start
-        return Answer(None, None, word, iterations, factorised)
+            found = refiner.refine(qp, result.x, result.y, self._tolerance)
+            factorisations += found.factorisations
+            if best is None or found.residual < best.residual:
+                best = found
+            if best.residual <= self._tolerance:
+                solver.warm_start(x=best.z, y=best.y)
+                break
+        if best is None:
+            self._solver = None  # the iterates of an infeasible program are a bad warm start
+            return Answer(None, None, word, iterations, factorisations)
+        return Answer(best.z, best.y, word, iterations, factorisations)
 
     def _prepare(self, qp: QP) -> int:
         """Bring the workspace up to date; return how often it factorised."""
@@ -89,29 +97,15 @@ class OSQPBackend(Backend):
             self._solver.update(q=qp.g, l=qp.l, u=qp.u)
             return 0
         upper = sp.csc_matrix(sp.triu(qp.H, format="csc"))
-        if (
-            self._solver is not None
-            and _same_pattern(qp.H, self._h)
-            and _same_pattern(qp.G, self._g)
-        ):
+        same = _same_pattern(qp.H, self._h) and _same_pattern(qp.G, self._g)
+        if self._solver is not None and same:
             self._solver.update(q=qp.g, l=qp.l, u=qp.u)
             self._solver.update(Px=upper.data, Ax=qp.G.data)
         else:
             self._solver = osqp.OSQP()
-            self._solver.setup(
-                upper,
-                qp.g,
-                qp.G,
-                qp.l,
-                qp.u,
-                verbose=False,
-                polishing=True,
-                polish_refine_iter=10,
-                max_iter=20000,
-                eps_prim_inf=1e-7,
-                eps_dual_inf=1e-7,
-            )
-        self._h, self._g = qp.H, qp.G
+            rows = (qp.G, qp.l, qp.u)
+            self._solver.setup(upper, qp.g, *rows, verbose=False, **_OSQP)
+        self._h, self._g, self._refiner = qp.H, qp.G, ActiveSet(qp.H, qp.G)
         return 1
 
 
@@ -201,3 +195,10 @@ _TOLERANCES = {
     "scs": ("eps_abs", "eps_rel"),
 }
 _MORE: dict[str, dict[str, Any]] = {"scs": {"max_iters": 100000}}
+# Infeasibility is decided late, and the answer refined elsewhere.
+_OSQP: dict[str, Any] = {
+    "max_iter": 20000,
+    "check_termination": 10,
+    "eps_prim_inf": 1e-7,
+    "eps_dual_inf": 1e-7,
+}
