@@ -1,6 +1,8 @@
 """Robots, obstacles, tasks and textbook problems, each as symbolic models."""
 
 from models.arm import PlanarArm
+from models.carima import Carima, CarimaPlant
+from models.carima_ocp import carima_ocp
 from models.distance_cost import Combine, DistanceCost
 from models.double_integrator import (
     bryson_denham,
@@ -29,6 +31,8 @@ from models.scenarios import ArmScenario, Difficulty, random_scenarios
 
 __all__ = [
     "ArmScenario",
+    "Carima",
+    "CarimaPlant",
     "Combine",
     "Cost",
     "Difficulty",
@@ -39,6 +43,7 @@ __all__ = [
     "Path",
     "PlanarArm",
     "bryson_denham",
+    "carima_ocp",
     "discrete_double_integrator",
     "distance_to_segment",
     "double_integrator_energy",

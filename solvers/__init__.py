@@ -2,6 +2,8 @@
 
 from solvers.batch import Batch
 from solvers.bellman import Table
+from solvers.gpc import GPC, GPCLaw
+from solvers.gpc_loop import GPCRun, gpc_loop
 from solvers.grid import Axis
 from solvers.grid_dp import GridDP
 from solvers.indirect_shooting import (
@@ -19,10 +21,13 @@ from solvers.schuetz import Schuetz
 from solvers.second_order import SecondOrder, second_order
 
 __all__ = [
+    "GPC",
     "Armijo",
     "Axis",
     "Batch",
     "FixedStep",
+    "GPCLaw",
+    "GPCRun",
     "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
@@ -35,6 +40,7 @@ __all__ = [
     "SecondOrder",
     "StepRule",
     "Table",
+    "gpc_loop",
     "multistart",
     "polish",
     "second_order",
