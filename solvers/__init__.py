@@ -4,6 +4,7 @@ from solvers.batch import Batch
 from solvers.bellman import Table
 from solvers.gpc import GPC, GPCLaw
 from solvers.gpc_loop import GPCRun, gpc_loop
+from solvers.greedy import Greedy
 from solvers.grid import Axis
 from solvers.grid_dp import GridDP
 from solvers.indirect_shooting import (
@@ -28,6 +29,7 @@ __all__ = [
     "FixedStep",
     "GPCLaw",
     "GPCRun",
+    "Greedy",
     "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
