@@ -91,12 +91,7 @@ class GridDP(Solver):
             raise UnsupportedProblem(f"{ocp.name}: GridDP takes no free final time")
         for c in ocp.at("initial"):
             raise UnsupportedProblem(f"{ocp.name}: GridDP takes no free start ('{c.name}')")
-        for c in ocp.at("terminal"):
-            if np.any(np.asarray(c.lower) == np.asarray(c.upper)) and not self.terminal_slack:
-                raise UnsupportedProblem(
-                    f"{ocp.name}: terminal constraint '{c.name}' is an equation, which no grid "
-                    "meets; give GridDP a terminal_slack"
-                )
+        self._refuse_equations(ocp)
         m = ocp.model
         states = _grid(self.states, ocp.state_bounds, m.x_names, "states")
         controls = _grid(self.controls, ocp.control_bounds, m.u_names, "controls")
@@ -106,6 +101,18 @@ class GridDP(Solver):
         half = replace(fine, grid=states.coarser, controls=controls.coarser)
         quarter = replace(fine, grid=half.grid.coarser, controls=half.controls.coarser)
         return GridDPProgram(self, ocp, tuple(b.prepare() for b in (quarter, half, fine)))
+
+    def _refuse_equations(self, ocp: OCP) -> None:
+        for c in (*ocp.at("path"), *ocp.at("terminal")):
+            if not np.any(np.asarray(c.lower) == np.asarray(c.upper)):
+                continue
+            if c.at == "terminal" and self.terminal_slack:
+                continue
+            advice = "give GridDP a terminal_slack" if c.at == "terminal" else "eliminate it"
+            raise UnsupportedProblem(
+                f"{ocp.name}: {c.at} constraint '{c.name}' is an equation, which no grid meets; "
+                f"{advice}"
+            )
 
     def _check_memory(self, ocp: OCP, states: Grid, controls: Grid) -> None:
         pairs, n = states.size * controls.size, ocp.steps or self.intervals

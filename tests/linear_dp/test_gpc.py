@@ -1,10 +1,11 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from models import Carima, CarimaPlant, carima_ocp
-from ocp import Box, ProblemError, Status, solve
+from ocp import OCP, Box, ProblemError, Status, solve
 from solvers import GPC, LinearMPC, MultipleShooting, gpc_loop
 from solvers.diophantine import diophantine
 from tests.tolerances import ROUNDING
@@ -17,7 +18,7 @@ PLANTS = {"thesis": THESIS, "late": LATE, "coloured": COLOURED}
 SAME = 1e-9
 
 
-@pytest.fixture(params=PLANTS.values(), ids=PLANTS.keys())
+@pytest.fixture(params=PLANTS.values(), ids=list(PLANTS))
 def plant(request) -> Carima:
     return request.param
 
@@ -28,7 +29,7 @@ def measured(steps: int = 40) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rng.normal(size=steps), rng.normal(size=steps - 1), rng.normal(size=steps)
 
 
-def as_problem(model: Carima, n: int, weight: float = 0.8, **bounds):
+def as_problem(model: Carima, n: int, weight: float = 0.8, **bounds: Any) -> OCP:
     y, u, w = measured()
     law = GPC(n2=n, weight=weight).build(model)
     noise = [law.prediction.noise(y[: i + 1], u[:i]) for i in range(1, len(y))]
@@ -160,7 +161,7 @@ def test_law_equals_the_problem(plant, solver):
 
 def test_law_equals_the_problem_with_bounds(plant):
     y, u, w = measured()
-    bounds = {"increment_bounds": Box(-1.0, 1.0), "input_bounds": Box(-1.5, 1.5)}
+    bounds: dict[str, Any] = {"increment_bounds": Box(-1.0, 1.0), "input_bounds": Box(-1.5, 1.5)}
     move = GPC(n2=6, weight=0.8, **bounds).build(plant).step(y, u, w)
     problem = as_problem(plant, 6, **bounds)
     solution = solve(problem, LinearMPC()).or_raise()

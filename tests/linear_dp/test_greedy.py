@@ -139,6 +139,9 @@ def test_refusals():
     free = OCP(**given, horizon=1.0, constraints=(Constraint("c", x, 0.0, 0.0, at="initial"),))
     with pytest.raises(UnsupportedProblem, match=r"free start \('c'\)"):
         Greedy().build(free)
-    for bad in ({"intervals": 0}, {"tolerance": 0.0}, {"max_iterations": 0}):
-        with pytest.raises(ProblemError):
-            Greedy(**bad)
+
+
+@pytest.mark.parametrize("bad", [{"intervals": 0}, {"tolerance": 0.0}, {"max_iterations": 0}])
+def test_bad_options(bad):
+    with pytest.raises(ProblemError):
+        Greedy(**bad)

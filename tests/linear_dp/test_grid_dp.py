@@ -214,6 +214,9 @@ def test_refusals():
     free = OCP(**given, horizon=1.0, constraints=(Constraint("c", x, 0.0, 0.0, at="initial"),))
     with pytest.raises(UnsupportedProblem, match=r"free start \('c'\)"):
         GridDP().build(free)
+    path = OCP(**given, horizon=1.0, constraints=(Constraint("c", x + u, 0.0, 0.0),))
+    with pytest.raises(UnsupportedProblem, match="path constraint 'c' is an equation"):
+        GridDP().build(path)
     with pytest.raises(ProblemError, match=r"states of 'x'.*Axis\(lower, upper, 101\)"):
         GridDP().build(OCP(**given, horizon=1.0))
     with pytest.raises(ProblemError, match=r"controls of 'u'.*Axis"):
