@@ -16,6 +16,8 @@ from ocp import ProblemError
 from solvers.active_set import ActiveSet
 from solvers.quadratic_program import QP
 
+# A backend measures its residuals in its own way; it is asked for this much more.
+_MARGIN = 0.1
 # What goes wrong inside a backend is its failure, never a sign that it is not installed.
 _INSIDE = (QPError, ArithmeticError, LookupError, RuntimeError, ValueError, TypeError)
 
@@ -115,7 +117,8 @@ class NamedBackend(Backend):
     def __init__(self, name: str, tolerance: float) -> None:
         """Keep name and tolerance."""
         self._name = name
-        self._options = {key: tolerance for key in _TOLERANCES.get(name, ())} | _MORE.get(name, {})
+        tight = _MARGIN * tolerance
+        self._options = dict.fromkeys(_TOLERANCES.get(name, ()), tight) | _MORE.get(name, {})
         self._sparse = name in qpsolvers.sparse_solvers
 
     def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
@@ -194,7 +197,9 @@ _TOLERANCES = {
     "proxqp": ("eps_abs", "eps_rel"),
     "scs": ("eps_abs", "eps_rel"),
 }
-_MORE: dict[str, dict[str, Any]] = {"scs": {"max_iters": 100000}}
+_MORE: dict[str, dict[str, Any]] = {
+    "scs": {"max_iters": 100000},
+}
 # Infeasibility is decided late, and the answer refined elsewhere.
 _OSQP: dict[str, Any] = {
     "max_iter": 20000,

@@ -25,8 +25,8 @@ from tests import tolerances
 BOUND, STEPS, DT = 2.0, 160, 0.05
 BACKENDS = ("osqp", "piqp", "clarabel", "daqp", "proxqp", "quadprog", "highs", "scs")
 FORMS = ("sparse", "condensed")
-# What a backend is asked for, and by how much its inputs may then be off.
-ACCURACY = {"scs": (1e-7, 1e-3), "highs": (1e-7, 1e-4)}
+# What a backend is asked for where it cannot do 1e-7.
+TOLERANCE = {"scs": 1e-5, "highs": 1e-5, "proxqp": 1e-6}
 
 
 def plant_step(dt: float = DT):
@@ -70,7 +70,7 @@ def test_a_reference_without_velocity_turns_the_order_round():
     finite = solve(thesis_tracking(STEPS, moving=False), LinearMPC())
     short = closed_loop(5, moving=False)
     peaks = np.abs(short.u[late]).max(), np.abs(finite.u[late]).max()
-    assert peaks == pytest.approx((7.1, 22.1), abs=0.1)
+    assert peaks == pytest.approx((7.1, 10.0), abs=0.1)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -191,14 +191,18 @@ def random_problem(seed: int) -> tuple[OCP, np.ndarray]:
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_backends_agree_on_random_feasible_problems(backend):
     needs(backend)
-    tolerance, accuracy = ACCURACY.get(backend, (1e-8, 1e-5))
+    tolerance = TOLERANCE.get(backend, 1e-7)
     for seed in range(20):
         ocp, _ = random_problem(seed)
         mine = solve(ocp, LinearMPC(backend=backend, tolerance=tolerance, form="condensed"))
         reference = solve(ocp, LinearMPC())
         assert reference.status is Status.SOLVED
         assert mine.status is Status.SOLVED, (seed, mine.message)
-        np.testing.assert_allclose(mine.u, reference.u, atol=accuracy)
+        assert mine.residual <= tolerance
+        assert mine.cost == pytest.approx(reference.cost, rel=10 * tolerance)
+        # The cost rises by at least R du^2 from its minimum, and R = 0.1.
+        within = np.sqrt(2 * tolerance * (1 + abs(reference.cost)) / 0.1)
+        np.testing.assert_allclose(mine.u, reference.u, atol=within)
 
 
 def test_unknown_and_missing_backends_are_told_apart():
