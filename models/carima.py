@@ -52,7 +52,7 @@ class Carima:
                 raise ProblemError(f"carima: {name} must begin with 1, not {getattr(self, name)}")
         if not any(self.b):
             raise ProblemError("carima: b is zero, the input has no effect")
-        if self.delay != int(self.delay) or self.delay < 0:
+        if not isinstance(self.delay, int | np.integer) or self.delay < 0:
             raise ProblemError(f"carima: delay = {self.delay!r}, a whole number >= 0 is needed")
         outside = np.abs(np.roots(self.c)).max(initial=0.0)
         if outside > _STABLE:

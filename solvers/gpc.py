@@ -62,6 +62,12 @@ class GPC:
 
     def __post_init__(self) -> None:
         """Check the options."""
+        for name in ("n2", "n1", "nu"):
+            value = getattr(self, name)
+            if not isinstance(value, int | np.integer) and not (value is None and name != "n2"):
+                raise ProblemError(f"GPC: {name} = {value!r}, a whole number of steps is needed")
+        if not 0.0 < self.tolerance < 1.0:
+            raise ProblemError(f"GPC: tolerance = {self.tolerance}, it must be in (0, 1)")
         if not 0.0 <= self.weight < np.inf:
             raise ProblemError(f"GPC: weight = {self.weight}, it must be >= 0, finite")
         for name in ("increment_bounds", "input_bounds", "output_bounds"):
@@ -90,7 +96,9 @@ class GPC:
                 f"GPC: 1 <= n1 <= n2 and 1 <= nu <= n2 - d are needed, "
                 f"not n1 = {n1}, n2 = {self.n2}, nu = {nu}, d = {model.delay}"
             )
-        law = GPCLaw(self, Prediction(model, n1, self.n2, nu), qp_backend(self.backend, 1e-9))
+        law = GPCLaw(
+            self, Prediction(model, n1, self.n2, nu), qp_backend(self.backend, self.tolerance)
+        )
         law.check()
         return law
 

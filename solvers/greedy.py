@@ -90,11 +90,15 @@ def _options(solver: Greedy) -> dict[str, Any]:
         "error_on_fail": False,
         "show_eval_warnings": False,
         "print_time": False,
+        # Its only check that the toolkit has not made itself prints a warning.
+        "inputs_check": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
         "ipopt.tol": solver.tolerance,
         "ipopt.max_iter": solver.max_iterations,
         "ipopt.bound_relax_factor": 0.0,
+        # Controls whose bounds are equal stay unknowns: else none may be left.
+        "ipopt.fixed_variable_treatment": "make_constraint",
     }
 
 

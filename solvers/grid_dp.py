@@ -129,6 +129,8 @@ class GridDP(Solver):
 
 def _grid(points: Points, box: Box, names: tuple[str, ...], what: str) -> Grid:
     """Return the axes, each within its bounds."""
+    if not isinstance(points, int | tuple | list):
+        raise ProblemError(f"GridDP: {what} = {points!r} is no number of points and no axes")
     given = (points,) * len(names) if isinstance(points, int) else tuple(points)
     if len(given) != len(names):
         raise ProblemError(
@@ -150,6 +152,8 @@ def _axis(axis: int | Axis, lower: float, upper: float, what: str) -> Axis:
                 f"{what}: the problem gives the bounds {lower:g} and {upper:g}; "
                 f"say where the grid ends, with Axis(lower, upper, {axis})"
             )
+        if lower == upper:
+            raise ProblemError(f"{what}: its bounds are both {lower:g}, there is nothing to grid")
         return Axis(lower, upper, axis)
     if axis.lower < lower or axis.upper > upper:
         raise ProblemError(

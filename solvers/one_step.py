@@ -18,12 +18,14 @@ class OneStep:
 
     Attributes:
         nlp: unknown u; data x, t, h, p0, p1, and t and p after the step.
+        rows: the constraints, of u and data; a backend that gives up returns none of its own.
         names: what each constraint says.
         lower: (rows,).
         upper: (rows,).
     """
 
     nlp: ca.Function
+    rows: ca.Function
     names: tuple[str, ...]
     lower: np.ndarray
     upper: np.ndarray
@@ -34,7 +36,8 @@ class OneStep:
         """Return the control, which constraint it breaks (or nothing), and the statistics."""
         limits = {"lbx": np.asarray(box.lower), "ubx": np.asarray(box.upper)}
         answer: Any = self.nlp(x0=u, p=data, lbg=self.lower, ubg=self.upper, **limits)
-        found, g = np.array(answer["x"]).ravel(), np.array(answer["g"]).ravel()
+        found = np.array(answer["x"]).ravel()
+        g = np.array(self.rows(found, data)).ravel()
         stats = self.nlp.stats()
         if not np.isfinite(found).all() or not np.isfinite(g).all():
             return box.clip(u), "a number that is not finite", stats
@@ -82,7 +85,8 @@ def one_step(ocp: OCP, stage: Stage, options: dict[str, Any], *, last: bool) -> 
     data = ca.vertcat(*s.values())
     g = ca.vertcat(ca.SX(0, 1), *rows.expressions)
     nlp = ca.nlpsol("step", "ipopt", {"x": u, "f": cost, "g": g, "p": data}, options)
-    return OneStep(nlp, tuple(rows.names), np.array(rows.lower), np.array(rows.upper))
+    function = ca.Function("rows", [u, data], [ca.densify(g)])
+    return OneStep(nlp, function, tuple(rows.names), np.array(rows.lower), np.array(rows.upper))
 
 
 class _Rows:

@@ -130,6 +130,22 @@ def test_time_and_signals_are_those_of_the_next_node():
     assert np.abs(solution.x[:, 0] - w).mean() < np.abs(still.x[:, 0] - w).mean()
 
 
+def test_a_control_that_is_fixed():
+    solution = solve(scalar(4, control_bounds=Box(0.1, 0.1)), Greedy())
+    assert solution.status is Status.MYOPIC
+    np.testing.assert_array_equal(solution.u, 0.1)
+
+
+def test_more_terminal_equations_than_controls_print_nothing(capfd):
+    model = line("walk", 1.0)
+    ends = ca.vertcat(model.x, model.x**2 + 1.0)
+    ends = Constraint("ends", ends, 0.0, 0.0, at="terminal")
+    solution = solve(walk(model=model, constraints=(ends,)), Greedy())
+    assert solution.status is Status.INFEASIBLE
+    assert "'ends'" in solution.message
+    assert capfd.readouterr() == ("", "")
+
+
 def test_refusals():
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
     model = Model(name="walk", x=x, u=u, f=u)

@@ -221,6 +221,10 @@ def test_refusals():
         GridDP().build(OCP(**given, horizon=1.0))
     with pytest.raises(ProblemError, match=r"controls of 'u'.*Axis"):
         GridDP(states=(Axis(0.0, 1.0, 11),)).build(OCP(**given, horizon=1.0))
+    with pytest.raises(ProblemError, match="no number of points"):
+        GridDP(states=4.5).build(scalar())  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ProblemError, match=r"controls of 'u'.*nothing to grid"):
+        GridDP().build(scalar(control_bounds=Box(1.0, 1.0)))
     with pytest.raises(ProblemError, match="2 entries for 1"):
         GridDP(states=(11, 11)).build(scalar())
     with pytest.raises(ProblemError, match="outside"):
