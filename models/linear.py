@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -73,9 +74,10 @@ class LinearPlant:
             name: what people call it.
         """
         try:
-            a, b, c, d = signal.tf2ss(numerator, denominator)
+            parts: Any = signal.tf2ss(numerator, denominator)
         except ValueError as error:
             raise ProblemError(f"{name}: {error}") from error
+        a, b, c, d = parts
         return cls(name=name, A=a, B=b, C=c, D=d)
 
     def sampled(self, dt: float) -> "LinearPlant":
@@ -83,7 +85,8 @@ class LinearPlant:
         at_least(dt, 0.0, f"{self.name}: dt", strictly=True)
         if self.dt is not None:
             raise ProblemError(f"{self.name}: sampled already, every {self.dt:g} s")
-        a, b, c, d, _ = signal.cont2discrete((self.A, self.B, self.C, self.D), dt)
+        sampled: Any = signal.cont2discrete((self.A, self.B, self.C, self.D), dt)
+        a, b, c, d, _ = sampled
         names = {"x_names": self.x_names, "u_names": self.u_names}
         return LinearPlant(name=self.name, A=a, B=b, C=c, D=d, dt=dt, **names)
 

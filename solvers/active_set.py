@@ -1,18 +1,27 @@
 """From an approximate solution of a quadratic program to an exact one."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from solvers.quadratic_program import QP, residuals
 
+# Its functions are compiled and have no types.
+_LAPACK: Any = lapack
 # Put on the diagonal so that dependent rows do not stop the factorisation; taken out again by
 # iterative refinement.
 _REGULARISATION = 1e-12
 _REFINEMENTS = 2
 _LIMIT = 12
+# Up to this many unknowns a dense factorisation is quicker than a sparse one.
+_DENSE = 160
+
+
+Solve = Callable[[np.ndarray], np.ndarray]
 
 
 class Refined(NamedTuple):
@@ -42,7 +51,8 @@ class ActiveSet:
     def __init__(self, h: sp.csc_matrix, g: sp.csc_matrix) -> None:
         """Take the matrices apart."""
         self._h, self._g = h.tocoo(), g.tocoo()
-        self._n = h.shape[0]
+        self._n = len(h.indptr) - 1
+        self._full: tuple[np.ndarray, np.ndarray] | None = None
         scale = max(1.0, np.abs(h.data).max(initial=0.0))
         self._shift = _REGULARISATION * scale
 
@@ -51,7 +61,7 @@ class ActiveSet:
         rows = qp.G @ z
         equal = qp.l == qp.u
         up, low = (qp.u - rows < y) & ~equal, (rows - qp.l < -y) & ~equal
-        best = Refined(z, y, max(residuals(qp, z, y)), 0)
+        best = Refined(z, y, np.inf, 0)
         seen: set[bytes] = set()
         for count in range(1, _LIMIT + 1):
             key = np.packbits(np.concatenate([up, low])).tobytes()
@@ -76,13 +86,40 @@ class ActiveSet:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return z and y where the active rows are equations."""
         n, picked = self._n, np.flatnonzero(active)
-        position = np.full(len(active), -1)
-        position[picked] = n + np.arange(len(picked))
-        keep = active[self._g.row]
-        at, col, value = position[self._g.row[keep]], self._g.col[keep], self._g.data[keep]
         size = n + len(picked)
         diagonal = np.full(size, -_REGULARISATION)
         diagonal[:n] = self._shift
+        try:
+            kkt, solve = (self._dense if size <= _DENSE else self._sparse)(picked, diagonal)
+        except RuntimeError:  # exactly singular
+            return np.full(n, np.nan), np.full(len(active), np.nan)
+        right = np.concatenate([-qp.g, bound[picked]])
+        solution = solve(right)
+        with np.errstate(all="ignore"):  # of a singular dense one the numbers are not finite
+            for _ in range(_REFINEMENTS):
+                solution += solve(right - kkt @ solution + diagonal * solution)
+        y = np.zeros(len(active))
+        y[picked] = solution[n:]
+        return solution[:n], y
+
+    def _dense(self, picked: np.ndarray, diagonal: np.ndarray) -> tuple[np.ndarray, Solve]:
+        n = self._n
+        if self._full is None:
+            self._full = self._h.toarray(), self._g.toarray()
+        kkt = np.diag(diagonal)
+        kkt[:n, :n] += self._full[0]
+        kkt[n:, :n] = self._full[1][picked]
+        kkt[:n, n:] = kkt[n:, :n].T
+        lu, pivots, _ = _LAPACK.dgetrf(kkt)
+        return kkt, lambda right: _LAPACK.dgetrs(lu, pivots, right)[0]
+
+    def _sparse(self, picked: np.ndarray, diagonal: np.ndarray) -> tuple[sp.csc_matrix, Solve]:
+        n, size = self._n, len(diagonal)
+        count = (self._g.shape or (0, 0))[0]
+        position = np.full(count, -1)
+        position[picked] = n + np.arange(len(picked))
+        keep = position[self._g.row] >= 0
+        at, col, value = position[self._g.row[keep]], self._g.col[keep], self._g.data[keep]
         own = np.arange(size)
         entries = (
             np.concatenate([self._h.data, value, value, diagonal]),
@@ -92,11 +129,4 @@ class ActiveSet:
             ),
         )
         kkt = sp.csc_matrix(entries, shape=(size, size))
-        factor = splu(kkt)
-        right = np.concatenate([-qp.g, bound[picked]])
-        solution = factor.solve(right)
-        for _ in range(_REFINEMENTS):
-            solution += factor.solve(right - kkt @ solution + diagonal * solution)
-        y = np.zeros(len(active))
-        y[picked] = solution[n:]
-        return solution[:n], y
+        return kkt, splu(kkt).solve

@@ -153,7 +153,9 @@ class LinearMPCProgram(Program):
         numbers = self.lq.on(data)
         hard, qp = self._programs(data, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
-        found = _NOTHING if answer.z is None else residuals(qp, answer.z, answer.y)
+        found = _NOTHING
+        if answer.z is not None and answer.y is not None:
+            found = residuals(qp, answer.z, answer.y)
         z, y, status, message = self._verdict(answer, found, hard, qp)
         x, u = self.form.trajectory(z, numbers, data.x0)
         costate = self.form.costates(y, numbers, x, u)

@@ -62,7 +62,8 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
     return Residuals(
         primal / (1.0 + sizes[0]),
         dual / (1.0 + max(sizes[1:])),
-        abs(quadratic + linear + paid) / (1.0 + max(abs(quadratic), abs(linear), abs(paid))),
+        abs(float(quadratic + linear + paid))
+        / float(1.0 + max(abs(quadratic), abs(linear), abs(paid))),
     )
 
 
@@ -89,9 +90,9 @@ class Softening:
         count = len(self.rows)
         unit = sp.identity(count, format="csc")
         select = sp.csc_matrix(
-            (-np.ones(count), (self.rows, np.arange(count))), shape=(g.shape[0], count)
+            (-np.ones(count), (self.rows, np.arange(count))), shape=(_rows(g), count)
         )
-        zero = sp.csc_matrix((count, g.shape[1]))
+        zero = sp.csc_matrix((count, len(g.indptr) - 1))
         rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
         return (
             sp.csc_matrix(sp.block_diag([h, self.price * unit], format="csc")),
@@ -118,3 +119,8 @@ class Softening:
         total = y[: len(y) - 2 * count].copy()
         total[self.rows] += y[len(total) : len(total) + count]
         return total
+
+
+def _rows(matrix: sp.csc_matrix) -> int:
+    """Height of a matrix; scipy's types do not promise a shape."""
+    return (matrix.shape or (0, 0))[0]

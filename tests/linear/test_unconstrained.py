@@ -43,9 +43,9 @@ COSTS = (4051.255044769, 5280.441131252)
 
 def dense_optimum(ocp: OCP) -> tuple[np.ndarray, np.ndarray]:
     """States and controls from one dense KKT system, its blocks read off by unit vectors."""
-    f, n, m, steps = ocp.functions, ocp.model.nx, ocp.model.nu, int(ocp.horizon)
+    f, n, m, steps = ocp.functions, ocp.model.nx, ocp.model.nu, ocp.steps or 0
     p = ocp.parameter_values().at(np.linspace(0, 1, steps + 1))
-    t = ocp.model.dt * np.arange(steps + 1)
+    t = (ocp.model.dt or 0) * np.arange(steps + 1)
     size, eye = (steps + 1) * n + steps * m, np.eye(n + m)
 
     def quadratic(value, width):
