@@ -1,12 +1,27 @@
 """Robots, obstacles, tasks and textbook problems, each as symbolic models."""
 
 from models.arm import PlanarArm
+from models.carima import Carima, CarimaPlant
+from models.carima_ocp import carima_ocp
 from models.distance_cost import Combine, DistanceCost
 from models.double_integrator import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_energy,
     double_integrator_minimum_time,
+)
+from models.linear import (
+    LinearPlant,
+    lq_regulator,
+    mass_spring_damper,
+    sinusoid,
+    stable_plant,
+    state_space,
+    step_reference,
+    thesis_regulator,
+    thesis_tracking,
+    tracking_ocp,
+    unstable_plant,
 )
 from models.obstacles import Disc, distance_to_segment, link_distances
 from models.oscillators import hypersensitive, rayleigh, van_der_pol
@@ -16,15 +31,19 @@ from models.scenarios import ArmScenario, Difficulty, random_scenarios
 
 __all__ = [
     "ArmScenario",
+    "Carima",
+    "CarimaPlant",
     "Combine",
     "Cost",
     "Difficulty",
     "Disc",
     "DistanceCost",
     "Form",
+    "LinearPlant",
     "Path",
     "PlanarArm",
     "bryson_denham",
+    "carima_ocp",
     "discrete_double_integrator",
     "distance_to_segment",
     "double_integrator_energy",
@@ -32,10 +51,20 @@ __all__ = [
     "hypersensitive",
     "line",
     "link_distances",
+    "lq_regulator",
+    "mass_spring_damper",
     "path_position",
     "path_velocity",
     "random_scenarios",
     "rayleigh",
     "redundancy_ocp",
+    "sinusoid",
+    "stable_plant",
+    "state_space",
+    "step_reference",
+    "thesis_regulator",
+    "thesis_tracking",
+    "tracking_ocp",
+    "unstable_plant",
     "van_der_pol",
 ]

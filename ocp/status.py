@@ -11,6 +11,10 @@ class Status(Enum):
     SOLVED = "the optimality conditions hold, with curvature as far as the method checks it"
     #: Success: a zero of the necessary conditions.
     STATIONARY = "the first-order conditions hold; whether it is a minimum is not known: polish it"
+    #: Greedy control: no step could be better, the trajectory could.
+    MYOPIC = (
+        "every step is the best one by itself, the trajectory is not: use a solver that looks ahead"
+    )
     #: The thesis' second termination condition.
     SMALL_DECREASE = (
         "stopped because the cost fell too little in one step; it need not be a minimum: "

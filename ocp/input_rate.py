@@ -1,0 +1,78 @@
+"""Constraints and costs on how fast the control changes, as a larger state."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.constraint import Box, Constraint
+from ocp.errors import ProblemError, UnsupportedProblem
+from ocp.expressions import numbers
+from ocp.model import Model
+from ocp.problem import OCP
+
+
+def with_input_rate(
+    ocp: OCP, *, rate: Box, previous: ArrayLike = 0.0, weight: ArrayLike = 0.0
+) -> OCP:
+    r"""Return a discrete-time problem whose control is the change of the control.
+
+    .. math:: z_k = (x_k, u_{k-1}), \quad u_k = u_{k-1} + \Delta u_k, \quad
+              L + \Delta u_k' W \Delta u_k, \quad
+              \underline{\Delta u} \le \Delta u_k \le \overline{\Delta u}
+
+    No solver needs to know: bounds of the rate are bounds of a control, those of the control
+    itself a path constraint, which also holds at the first step.
+
+    Args:
+        ocp: discrete in time.
+        rate: bounds of the change per step, in units of u.
+        previous: control applied before the start (m,); it is part of the new initial state.
+        weight: W, weights of the squared changes (m,), none negative.
+
+    Raises:
+        UnsupportedProblem: for a continuous model, where the derivative of the control is meant.
+        ProblemError: for a negative weight or a wrong size.
+    """
+    m = ocp.model
+    if not m.is_discrete:
+        raise UnsupportedProblem(f"{ocp.name}: a change per step needs a discrete-time model")
+    weights = numbers(weight, m.nu, f"{ocp.name}: weight of the rate")
+    if (weights < 0.0).any():
+        raise ProblemError(f"{ocp.name}: a negative weight of the rate: {weights}")
+    before = ca.vertcat(*[ca.SX.sym(f"previous {name}") for name in m.u_names])
+    change = ca.vertcat(*[ca.SX.sym(f"change of {name}") for name in m.u_names])
+    now = before + change
+
+    def moved(expression: ca.SX | float) -> ca.SX:
+        return ca.substitute(ca.SX(expression), m.u, now)
+
+    units = m.u_units or ("",) * m.nu
+    model = Model(
+        name=f"{m.name} with input rate",
+        x=ca.vertcat(m.x, before),
+        u=change,
+        f=ca.vertcat(moved(m.f), now),
+        t=m.t,
+        dt=m.dt,
+        x_units=(*m.x_units, *units) if m.x_units else (),
+        u_units=m.u_units,
+    )
+    constraints = [replace(c, expression=moved(c.expression)) for c in ocp.constraints]
+    if ocp.control_bounds.is_active:
+        box = ocp.control_bounds
+        constraints.append(Constraint("control_bounds", now, box.lower, box.upper))
+    free = np.full(m.nu, np.inf)
+    state = ocp.state_bounds
+    return replace(
+        ocp,
+        name=f"{ocp.name}, with input rate",
+        model=model,
+        x0=np.append(np.asarray(ocp.x0), numbers(previous, m.nu, f"{ocp.name}: previous")),
+        running_cost=moved(ocp.running_cost) + ca.dot(ca.DM(weights), change**2),
+        control_bounds=rate,
+        state_bounds=Box(np.append(state.lower, -free), np.append(state.upper, free)),
+        constraints=tuple(constraints),
+        guess=None,
+    )

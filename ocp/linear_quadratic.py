@@ -1,0 +1,237 @@
+"""A linear-quadratic problem as arrays: sampled by one call on the data of a run."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.constraint import Box
+from ocp.data import Data
+from ocp.errors import ProblemError
+from ocp.problem import OCP
+
+# An eigenvalue this much below zero, relative to the largest one, is rounding.
+_ROUNDING = 1e-10
+
+
+class Matrices(NamedTuple):
+    """What multiplies states and controls, stage by stage.
+
+    Attributes:
+        A: (N, n, n).
+        B: (N, n, m).
+        Q: (N, n, n).
+        S: (N, n, m).
+        R: (N, m, m).
+        P: terminal weight (n, n).
+        D_x: constraint rows at nodes 0..N-1, states (N, rows, n).
+        D_u: the same, controls (N, rows, m).
+        D_f: constraint rows at node N (end rows, n).
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    Q: np.ndarray
+    S: np.ndarray
+    R: np.ndarray
+    P: np.ndarray
+    D_x: np.ndarray
+    D_u: np.ndarray
+    D_f: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """The blocks [[Q, S], [S', R]], (N, n + m, n + m)."""
+        return np.block([[self.Q, self.S], [self.S.transpose(0, 2, 1), self.R]])
+
+    def indefinite(self) -> str | None:
+        """Return which weight is not as (positive) definite as it must be, or None."""
+        for name, array, strictly in (
+            ("R", self.R, True),
+            ("Q", self.Q, False),
+            ("P", self.P[None], False),
+            ("[Q S; S' R]", self.weights, False),
+        ):
+            values = np.linalg.eigvalsh(array)
+            least, scale = values[:, 0], np.abs(values).max(initial=0.0)
+            bad = least <= _ROUNDING * scale if strictly else least < -_ROUNDING * scale
+            if bad.any():
+                k = int(bad.argmax())
+                at = f" at step {k}" if np.ptp(array, axis=0).any() else ""
+                kind = "definite" if strictly else "semi-definite"
+                return f"{name} is not positive {kind}{at}: it has the eigenvalue {least[k]:.6g}"
+        return None
+
+
+class LQData(NamedTuple):
+    """The numbers of one run; the same ``matrices`` object as long as they do not change.
+
+    Attributes:
+        matrices: what multiplies states and controls.
+        c: affine terms of the dynamics (N, n).
+        q: linear terms of the cost (N, n), counted twice as all cross terms.
+        r: (N, m).
+        constant: sum of the constant terms, the terminal one included.
+        p: terminal linear term (n,).
+        lower: bounds of the rows at nodes 0..N-1 (N, rows).
+        upper: the same.
+        lower_f: bounds of the rows at node N (end rows,).
+        upper_f: the same.
+    """
+
+    matrices: Matrices
+    c: np.ndarray
+    q: np.ndarray
+    r: np.ndarray
+    constant: float
+    p: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    lower_f: np.ndarray
+    upper_f: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LinearQuadratic:
+    r"""A discrete-time problem with linear dynamics, linear constraints, convex quadratic cost.
+
+    .. math::
+
+        \min \; x_N'Px_N + 2p'x_N + \sum_{k=0}^{N-1}
+            x_k'Q_kx_k + 2x_k'S_ku_k + u_k'R_ku_k + 2q_k'x_k + 2r_k'u_k + \text{const}
+
+        x_{k+1} = A_kx_k + B_ku_k + c_k, \quad
+        \underline d_k \le D_{x,k}x_k + D_{u,k}u_k \le \overline d_k, \quad
+        \underline d_N \le D_fx_N \le \overline d_N
+
+    The thesis' convention (2.1): no factor one half, so costates are 2 (P_k x_k + p_k). Path
+    constraints, and boxes as unit rows, stand in one list of rows. A row without control says
+    nothing at node 0, which is measured, and holds at node N as well.
+
+    Attributes:
+        ocp: the problem.
+        rows: name of each row at nodes 0..N-1.
+        end_rows: name of each row at node N.
+        on_control: whether a row has a control in it, (rows,).
+        is_control_bound: whether a row is a bound of one control, (rows,).
+        stage_matrices: (t, parameters) -> A, B, Q, S, R, D_x, D_u.
+        stage_vectors: (t, parameters) -> (c, q, r, constant, offset of the rows), one column.
+        end_matrices: (t, parameters) -> P, D_f.
+        end_vectors: (t, parameters) -> (p, constant, offset of the end rows), one column.
+        row_box: bounds of the rows.
+        end_box: bounds of the end rows.
+    """
+
+    ocp: OCP
+    rows: tuple[str, ...]
+    end_rows: tuple[str, ...]
+    on_control: np.ndarray
+    is_control_bound: np.ndarray
+    stage_matrices: ca.Function
+    stage_vectors: ca.Function
+    end_matrices: ca.Function
+    end_vectors: ca.Function
+    row_box: Box
+    end_box: Box
+
+    @property
+    def steps(self) -> int:
+        """Number of steps N."""
+        return self.ocp.steps or 0
+
+    def data(
+        self, x0: ArrayLike | None, t0: float, parameters: Mapping[str, ArrayLike] | None
+    ) -> Data:
+        """Return the data of a run; a measured start may lie outside the state bounds."""
+        return Data(self._unbounded.start(x0), t0, self.ocp.parameter_values(parameters))
+
+    def on(self, data: Data) -> LQData:
+        """Return the numbers of a run.
+
+        Raises:
+            ProblemError: if parameters make a weight indefinite.
+        """
+        if self.fixed is not None:
+            matrices = self.fixed
+        else:
+            matrices = self.sample_matrices(data)
+            complaint = matrices.indefinite()
+            if complaint:
+                raise ProblemError(f"{self.ocp.name}: with these parameters {complaint}")
+        return self._sample_vectors(data, matrices)
+
+    # -- sampling ---------------------------------------------------------------------------
+
+    @cached_property
+    def _unbounded(self) -> OCP:
+        return replace(self.ocp, state_bounds=Box())
+
+    @cached_property
+    def fixed(self) -> Matrices | None:
+        """The matrices, where they depend on neither time nor parameters."""
+        varying = any(
+            f.sparsity_jac(i, o).nnz()
+            for f in (self.stage_matrices, self.end_matrices)
+            for i in range(2)
+            for o in range(f.n_out())
+            if f.size1_in(i) and f.numel_out(o)
+        )
+        return None if varying else self.sample_matrices(self.declared)
+
+    @property
+    def declared(self) -> Data:
+        """The data of a run that leaves everything as declared."""
+        return self.data(None, 0.0, None)
+
+    @cached_property
+    def _fractions(self) -> np.ndarray:
+        return np.linspace(0.0, 1.0, self.steps + 1)
+
+    @cached_property
+    def _stages(self) -> tuple[ca.Function, ca.Function]:
+        return self.stage_matrices.map(self.steps), self.stage_vectors.map(self.steps)
+
+    def _at(self, data: Data) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
+        """Times (1, N), parameters (n_p, N) at the stages; time and parameters at the end."""
+        p = data.values.at(self._fractions, 1)
+        t = data.t0 + self._fractions * self.ocp.duration
+        return t[None, :-1], p[:-1].T, float(t[-1]), p[-1]
+
+    def sample_matrices(self, data: Data) -> Matrices:
+        """Return the matrices of a run, whether convex or not."""
+        t, p, t_end, p_end = self._at(data)
+        blocks = [
+            np.array(m).reshape(m.shape[0], self.steps, m.shape[1] // self.steps).transpose(1, 0, 2)
+            for m in self._stages[0](t, p)
+        ]
+        end = [np.array(m) for m in self.end_matrices(t_end, p_end)]
+        a, b, q, s, r, d_x, d_u = blocks
+        return Matrices(a, b, q, s, r, end[0], d_x, d_u, end[1])
+
+    def _sample_vectors(self, data: Data, matrices: Matrices) -> LQData:
+        t, p, t_end, p_end = self._at(data)
+        n, m, steps = self.ocp.model.nx, self.ocp.model.nu, self.steps
+        stage = np.array(self._stages[1](t, p)).reshape(-1, steps).T
+        end = np.array(self.end_vectors(t_end, p_end)).ravel()
+        if not (np.isfinite(stage).all() and np.isfinite(end).all()):
+            raise ProblemError(f"{self.ocp.name}: a linear term is not finite for these data")
+        k = 2 * n + m
+        lower = np.asarray(self.row_box.lower) - stage[:, k + 1 :]
+        upper = np.asarray(self.row_box.upper) - stage[:, k + 1 :]
+        lower[0, ~self.on_control], upper[0, ~self.on_control] = -np.inf, np.inf
+        return LQData(
+            matrices=matrices,
+            c=stage[:, :n],
+            q=stage[:, n : 2 * n],
+            r=stage[:, 2 * n : k],
+            constant=float(stage[:, k].sum() + end[n]),
+            p=end[:n],
+            lower=lower,
+            upper=upper,
+            lower_f=np.asarray(self.end_box.lower) - end[n + 1 :],
+            upper_f=np.asarray(self.end_box.upper) - end[n + 1 :],
+        )

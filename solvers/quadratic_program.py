@@ -1,0 +1,126 @@
+"""A quadratic program, its residuals, and the exact penalty that makes rows soft."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+
+class QP(NamedTuple):
+    r"""A convex quadratic program.
+
+    .. math:: \min_z \; \frac12 z'Hz + g'z \quad \text{s.t.} \quad l \le Gz \le u
+
+    Attributes:
+        H: symmetric, sparse by columns (n, n).
+        G: sparse by columns (rows, n).
+        g: (n,).
+        l: (rows,), equal to ``u`` for an equation.
+        u: (rows,).
+    """
+
+    H: sp.csc_matrix
+    G: sp.csc_matrix
+    g: np.ndarray
+    l: np.ndarray  # noqa: E741
+    u: np.ndarray
+
+
+class Residuals(NamedTuple):
+    """How far a point is from optimal, relative to the size of what has to cancel.
+
+    Attributes:
+        primal: largest violation of a row.
+        dual: largest component of Hz + g + G'y.
+        gap: difference of the primal and the dual cost.
+    """
+
+    primal: float
+    dual: float
+    gap: float
+
+
+def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
+    """Return the residuals of a point, whatever a backend says about it.
+
+    Args:
+        qp: the program.
+        z: (n,).
+        y: multipliers (rows,), positive at upper bounds, negative at lower ones. The sign a
+            bound that does not exist would have counts as a dual residual.
+    """
+    rows, curved = qp.G @ z, qp.H @ z
+    pulled = qp.G.T @ y
+    primal = max((qp.l - rows).max(initial=0.0), (rows - qp.u).max(initial=0.0))
+    impossible = np.where(y > 0.0, np.isinf(qp.u), np.isinf(qp.l)) * np.abs(y)
+    dual = max(np.abs(curved + qp.g + pulled).max(initial=0.0), impossible.max(initial=0.0))
+    bound = np.where(y > 0.0, qp.u, qp.l)
+    paid = y @ np.where(np.isfinite(bound), bound, 0.0)
+    quadratic, linear = z @ curved, qp.g @ z
+    sizes = [np.abs(v).max(initial=0.0) for v in (rows, curved, qp.g, pulled)]
+    return Residuals(
+        primal / (1.0 + sizes[0]),
+        dual / (1.0 + max(sizes[1:])),
+        abs(float(quadratic + linear + paid))
+        / float(1.0 + max(abs(quadratic), abs(linear), abs(paid))),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Softening:
+    r"""Rows that may be exceeded at a price.
+
+    .. math:: l_i - e_i \le G_i z \le u_i + e_i, \quad e_i \ge 0, \quad
+              \dots + w (e_i + e_i^2/2)
+
+    Exact: where the hard program is feasible and w exceeds its multipliers, both have the
+    same solution [Nocedal & Wright 2006, section 17.2].
+
+    Attributes:
+        rows: which rows, indices (s,).
+        price: w, positive.
+    """
+
+    rows: np.ndarray
+    price: float
+
+    def soften(self, h: sp.csc_matrix, g: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
+        """Return the matrices H and G of the program with slacks e behind z."""
+        count = len(self.rows)
+        unit = sp.identity(count, format="csc")
+        select = sp.csc_matrix(
+            (-np.ones(count), (self.rows, np.arange(count))), shape=(_rows(g), count)
+        )
+        zero = sp.csc_matrix((count, len(g.indptr) - 1))
+        rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
+        return (
+            sp.csc_matrix(sp.block_diag([h, self.price * unit], format="csc")),
+            sp.csc_matrix(rows),
+        )
+
+    def bounds(
+        self, g: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return g, l and u of the program with slacks."""
+        count = len(self.rows)
+        hard = low.copy()
+        hard[self.rows] = -np.inf
+        free = np.full(count, np.inf)
+        return (
+            np.concatenate([g, np.full(count, self.price)]),
+            np.concatenate([hard, low[self.rows], np.zeros(count)]),
+            np.concatenate([high, free, free]),
+        )
+
+    def multipliers(self, y: np.ndarray) -> np.ndarray:
+        """Return one multiplier per original row."""
+        count = len(self.rows)
+        total = y[: len(y) - 2 * count].copy()
+        total[self.rows] += y[len(total) : len(total) + count]
+        return total
+
+
+def _rows(matrix: sp.csc_matrix) -> int:
+    """Height of a matrix; scipy's types do not promise a shape."""
+    return (matrix.shape or (0, 0))[0]

@@ -1,0 +1,151 @@
+"""Riccati's recursion on stacked matrices, and what all linear solvers make of its arrays."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ocp import OCP, LinearQuadratic, LQData, Matrices, UnsupportedProblem, stationary
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    r"""The part of the recursion that no reference changes.
+
+    Attributes:
+        P: cost-to-go (N + 1, n, n).
+        K: feedback (N, m, n).
+        G: R + B'PB, (N, m, m).
+        closed: A - BK, (N, n, n).
+    """
+
+    P: np.ndarray
+    K: np.ndarray
+    G: np.ndarray
+    closed: np.ndarray
+
+
+def gains(matrices: Matrices) -> Gains:
+    r"""Return gains and costs-to-go, backwards from the terminal weight.
+
+    .. math:: K_k = (R + B'P_{k+1}B)^{-1}(S' + B'P_{k+1}A), \qquad
+              P_k = \begin{pmatrix} E \\ -K \end{pmatrix}'
+                    \begin{pmatrix} Q & S \\ S' & R \end{pmatrix}
+                    \begin{pmatrix} E \\ -K \end{pmatrix} + (A - BK)'P_{k+1}(A - BK)
+
+    which is (2.47) and (2.48) with a cross term, as a sum of squares: no step can lose the
+    symmetry or the sign of P.
+    """
+    a, b, w = matrices.A, matrices.B, matrices.weights
+    steps, n, m = b.shape
+    p, k = np.empty((steps + 1, n, n)), np.empty((steps, m, n))
+    g, closed = np.empty((steps, m, m)), np.empty((steps, n, n))
+    p[steps] = matrices.P
+    left = np.hstack([np.eye(n), np.zeros((n, m))])
+    for i in range(steps - 1, -1, -1):
+        after = b[i].T @ p[i + 1]
+        g[i] = matrices.R[i] + after @ b[i]
+        k[i] = np.linalg.solve(g[i], matrices.S[i].T + after @ a[i])
+        closed[i] = a[i] - b[i] @ k[i]
+        left[:, n:] = -k[i].T
+        p[i] = left @ w[i] @ left.T + closed[i].T @ p[i + 1] @ closed[i]
+        p[i] = (p[i] + p[i].T) / 2
+    return Gains(p, k, g, closed)
+
+
+def stabilising(matrices: Matrices, name: str) -> np.ndarray:
+    """Return feedback gains (N, m, n) under which errors do not grow.
+
+    Those of the infinite horizon where they exist, else those of the recursion.
+    """
+    try:
+        return np.repeat(stationary(matrices, name).K[None], len(matrices.A), axis=0)
+    except UnsupportedProblem:
+        return gains(matrices).K
+
+
+def affine_parts(g: Gains, data: LQData) -> tuple[np.ndarray, np.ndarray]:
+    """Return p (N + 1, n) of the cost-to-go x'Px + 2p'x, and k (N, m) of u = -Kx - k."""
+    steps, m = g.K.shape[:2]
+    p, ahead = np.empty((steps + 1, len(data.p))), np.empty_like(data.c)
+    p[steps] = data.p
+    drift = np.einsum("kij,kj->ki", g.P[1:], data.c)
+    fixed = data.q - np.einsum("kji,kj->ki", g.K, data.r)
+    for i in range(steps - 1, -1, -1):
+        ahead[i] = drift[i] + p[i + 1]
+        p[i] = fixed[i] + ahead[i] @ g.closed[i]
+    h = data.r + np.einsum("kji,kj->ki", data.matrices.B, ahead)
+    return p, np.linalg.solve(g.G, h[:, :, None]).reshape(steps, m)
+
+
+def roll(
+    data: LQData, x0: np.ndarray, feedback: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return states (N + 1, n) and controls (N, m) of u = -Kx + v."""
+    m = data.matrices
+    x = np.empty((len(v) + 1, len(x0)))
+    x[0] = x0
+    closed = m.A - m.B @ feedback
+    drive = np.einsum("kij,kj->ki", m.B, v) + data.c
+    for i in range(len(v)):
+        x[i + 1] = closed[i] @ x[i] + drive[i]
+    return x, v - np.einsum("kij,kj->ki", feedback, x[:-1])
+
+
+def cost(data: LQData, x: np.ndarray, u: np.ndarray) -> float:
+    """Return the cost of a trajectory."""
+    m, z = data.matrices, x[:-1]
+    running = (
+        np.einsum("ki,kij,kj->", z, m.Q, z)
+        + 2.0 * np.einsum("ki,kij,kj->", z, m.S, u)
+        + np.einsum("ki,kij,kj->", u, m.R, u)
+        + 2.0 * (np.vdot(data.q, z) + np.vdot(data.r, u))
+    )
+    return float(running + x[-1] @ (m.P @ x[-1] + 2.0 * data.p) + data.constant)
+
+
+def slopes(data: LQData, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return derivatives of the running cost by states (N, n) and controls (N, m)."""
+    m, z = data.matrices, x[:-1]
+    by_x = np.einsum("kij,kj->ki", m.Q, z) + np.einsum("kij,kj->ki", m.S, u) + data.q
+    by_u = np.einsum("kji,kj->ki", m.S, z) + np.einsum("kij,kj->ki", m.R, u) + data.r
+    return 2.0 * by_x, 2.0 * by_u
+
+
+def adjoint(
+    data: LQData,
+    feedback: np.ndarray,
+    by_x: np.ndarray,
+    by_u: np.ndarray,
+    final: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return costates (N + 1, n) and H_u (N, m), backwards along the closed loop.
+
+    For any feedback K the same costates, where H_u = 0: lambda = L_x - K' L_u + (A - BK)'
+    lambda after. With a stabilising one errors decay on the way.
+
+    Args:
+        data: the problem.
+        feedback: K (N, m, n).
+        by_x: derivatives of the running cost and of the constraints' terms, (N, n).
+        by_u: the same by the control (N, m).
+        final: costate at the end (n,).
+    """
+    m = data.matrices
+    closed = m.A - m.B @ feedback
+    fixed = by_x - np.einsum("kji,kj->ki", feedback, by_u)
+    costate = np.empty((len(by_x) + 1, by_x.shape[1]))
+    costate[-1] = final
+    for i in range(len(by_x) - 1, -1, -1):
+        costate[i] = fixed[i] + costate[i + 1] @ closed[i]
+    return costate, by_u + np.einsum("kji,kj->ki", m.B, costate[1:])
+
+
+def refuse_constraints(lq: LinearQuadratic, solver: str) -> None:
+    """Raise ``UnsupportedProblem`` naming the first bound or constraint."""
+    ocp: OCP = lq.ocp
+    names = [*lq.rows, *lq.end_rows]
+    if names:
+        raise UnsupportedProblem(
+            f"{ocp.name}: {solver} knows no constraints, and there is '{names[0]}'; "
+            "take LinearMPC or MultipleShooting"
+        )

@@ -1,0 +1,1 @@
+"""Dynamic programming, greedy control and generalised predictive control."""
