@@ -11,7 +11,7 @@ _COARSE, _FINE, _DURATION = 0.05, 0.01, 4.0
 _SHORT = 5
 # Windows of time [s], position [m] and input [N].
 _NEAR = ((2.1, 3.0), (-2.06, -0.8), (-7.0, 16.0))
-_ALL = ((0.4, _DURATION), (-2.2, 2.2), (-LARGEST, LARGEST))
+_ALL = ((0.4, _DURATION), (-3.6, 2.3), (-LARGEST, LARGEST))
 
 
 def smaller_steps() -> Drawing:
