@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench``."""
+"""Command line: ``python -m benchmarks list | run | bench | figures``."""
 
 import argparse
 import sys
@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
 from benchmarks.extremes import extremes_table
+from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.jacobians import jacobian_table
 from benchmarks.methods import Method, Settings, all_methods
 from benchmarks.pictures import bench_picture
@@ -40,6 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _list(console)
     if options.command == "bench":
         return _bench(console, options.out, options.workers)
+    if options.command == "figures":
+        return _figures(console, options.numbers, options.out)
     cases = _chosen(all_cases(), options.case, "case")
     if options.suite:
         cases = [case for case in cases if case.suite == options.suite]
@@ -64,6 +68,10 @@ def _parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="the main job: six scenarios, a table, a picture")
     for command in (run, bench):
         command.add_argument("--workers", type=_positive, default=2, metavar="W")
+    figures = commands.add_parser("figures", help="figures of chapter 2, with their data")
+    known = ", ".join(figure.number for figure in FIGURES)
+    figures.add_argument("numbers", nargs="*", metavar="NUMBER", help=f"of {known}; none: all")
+    for command in (run, bench, figures):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser
 
@@ -112,6 +120,22 @@ def _bench(console: Console, out: Path, workers: int) -> int:
     code = _run(console, cases, methods, Settings(starts=4), out, workers, resume=False)
     console.print(f"picture: {bench_picture(BENCH_CASES[0], out)}")
     return code
+
+
+def _figures(console: Console, numbers: Sequence[str], out: Path) -> int:
+    try:
+        wanted = chosen(numbers)
+    except KeyError as unknown:
+        known = ", ".join(figure.number for figure in FIGURES)
+        print(f"no figure has the number {unknown}; there are {known}", file=sys.stderr)
+        return 2
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("figures", total=len(wanted))
+        for figure, drawing in draw_all(wanted, out):
+            bar.console.print(drawing.sentence, highlight=False, soft_wrap=True)
+            bar.console.print(f"  {out / figure.stem}.png, .csv", highlight=False, soft_wrap=True)
+            bar.advance(task)
+    return 0
 
 
 def _run(

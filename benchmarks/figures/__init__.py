@@ -1,0 +1,69 @@
+"""The figures of chapter 2 of the thesis, each drawn from results computed for it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.figures import (
+    constrained,
+    dynamic_programming,
+    free_and_forced,
+    horizon_map,
+    interval,
+    predictive,
+    regulation,
+)
+from benchmarks.figures.drawing import Drawing, write
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the thesis.
+
+    Attributes:
+        number: as the thesis has it.
+        about: what it shows, in a few words.
+        draw: computes and draws it.
+    """
+
+    number: str
+    about: str
+    draw: Callable[[], Drawing]
+
+    @property
+    def stem(self) -> str:
+        """Name of its files, without extension."""
+        return f"fig-{self.number}"
+
+
+FIGURES = (
+    Figure("2.2", "dynamic programming with one state", dynamic_programming.value_function),
+    Figure("2.3", "states, batch and recursive", regulation.states),
+    Figure("2.4", "inputs, batch and recursive", regulation.inputs),
+    Figure("2.7", "free and forced response", free_and_forced.responses),
+    Figure("2.8", "outputs under GPC", predictive.outputs),
+    Figure("2.9", "cost of GPC over the horizon", predictive.costs),
+    Figure("2.10", "constrained position", constrained.positions),
+    Figure("2.11", "velocity under a constrained position", constrained.velocities),
+    Figure("2.12", "approaching the constraint", constrained.approach),
+    Figure("2.13", "a smaller interval", interval.smaller_steps),
+    Figure("2.14", "horizon and interval", horizon_map.horizon_and_interval),
+)
+
+
+def chosen(numbers: Sequence[str]) -> tuple[Figure, ...]:
+    """Return the figures of these numbers, all of them if there is none.
+
+    Raises:
+        KeyError: for the first number that is not that of a figure.
+    """
+    known = {figure.number: figure for figure in FIGURES}
+    return tuple(known[number] for number in dict.fromkeys(numbers)) if numbers else FIGURES
+
+
+def draw_all(figures: Sequence[Figure], out: Path) -> Iterator[tuple[Figure, Drawing]]:
+    """Draw one after the other, write each to ``fig-<number>.png`` and ``.csv``, and yield it."""
+    for figure in figures:
+        drawing = figure.draw()
+        write(drawing, figure.stem, out)
+        yield figure, drawing

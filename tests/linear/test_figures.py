@@ -1,0 +1,108 @@
+"""The figures of chapter 2: drawn, with their data, and the claims made with them."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.figures import FIGURES, chosen, draw_all
+from benchmarks.figures.mpc_runs import all_runs, peak
+
+QUICK = ("2.2", "2.3", "2.4", "2.7", "2.8", "2.9")
+SLOW = tuple(figure.number for figure in FIGURES if figure.number not in QUICK)
+
+
+def drawn(number: str, out: Path) -> dict[str, np.ndarray]:
+    """Draw, check both files, and return the data as the file has it."""
+    ((figure, drawing),) = draw_all(chosen([number]), out)
+    picture = out / f"fig-{number}.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size > 20_000
+    assert drawing.sentence.startswith(f"Fig. {figure.number}: ")
+    assert "Chosen here" in drawing.sentence
+    with (out / f"fig-{number}.csv").open(encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    assert header == list(drawing.columns)
+    assert all(name.endswith("]") for name in header), "every column has a unit"
+    columns = zip(*rows, strict=True)
+    return {
+        name: np.array([float(value) for value in column if value])
+        for name, column in zip(header, columns, strict=True)
+    }
+
+
+@pytest.mark.parametrize("number", QUICK)
+def test_quick_figures_are_drawn(number, tmp_path):
+    assert drawn(number, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SLOW)
+def test_slow_figures_are_drawn(number, tmp_path):
+    assert drawn(number, tmp_path)
+
+
+def test_batch_and_recursion_agree(tmp_path):
+    for number in ("2.3", "2.4"):
+        data = drawn(number, tmp_path)
+        for name in (name for name in data if ", batch" in name):
+            other = data[name.replace("batch", "recursive")]
+            # Fed forward, the unstable plant amplifies rounding.
+            np.testing.assert_allclose(data[name], other, atol=1e-7)
+
+
+def test_free_and_forced_responses_add_up(tmp_path):
+    data = drawn("2.7", tmp_path)
+    ahead = slice(7, None)
+    total = data["y, free [-]"] + data["y, forced [-]"]
+    np.testing.assert_allclose(total[ahead], data["y, all [-]"][ahead], atol=1e-12)
+
+
+def test_cost_of_gpc_converges_with_the_horizon(tmp_path):
+    data = drawn("2.9", tmp_path)
+    for name in (name for name in data if name.startswith("cost")):
+        assert data[name][0] > 1.5 * data[name][-1]
+        assert data[name][4] <= 1.002 * data[name][-1]
+
+
+@pytest.mark.slow
+def test_constraints_hold_and_the_short_horizon_pushes_hardest():
+    moving, still = all_runs(), all_runs(moving=False)
+    for loop in (*moving.values(), *still.values()):
+        assert np.abs(loop.x[:, 0]).max() <= 2.0 + 1e-6
+        assert np.abs(loop.u).max() <= 40.0 + 1e-6
+    assert peak(moving["N = 5"]) >= 1.15 * peak(moving["finite horizon"])
+    assert peak(still["N = 5"]) < peak(still["finite horizon"])
+
+
+@pytest.mark.slow
+def test_a_smaller_interval_is_smoother_at_the_same_real_time_horizon(tmp_path):
+    data = drawn("2.13", tmp_path)
+    name = "u, dt = {} s, N = {} [N]".format
+    coarse, same_time, same_count = (data[name(*a)] for a in ((0.05, 5), (0.01, 25), (0.01, 5)))
+    late = coarse[10:], same_time[50:], same_count[50:]
+    assert np.abs(late[1]).max() < np.abs(late[0]).max() < np.abs(late[2]).max()
+    assert np.abs(np.diff(late[1])).max() < 0.5 * np.abs(np.diff(late[0])).max()
+
+
+def test_the_command_line_draws_what_it_is_told(tmp_path, capsys):
+    assert main(["figures", "2.9", "2.7", "2.9", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("Fig. 2.9: ") == shown.count("Fig. 2.7: ") == 1
+    assert {file.name for file in tmp_path.iterdir()} == {
+        f"fig-{number}.{kind}" for number in ("2.7", "2.9") for kind in ("png", "csv")
+    }
+
+
+def test_an_unknown_number_is_said(tmp_path, capsys):
+    assert main(["figures", "2.3", "9.9", "--out", str(tmp_path / "none")]) == 2
+    said = capsys.readouterr().err
+    assert "no figure has the number '9.9'" in said
+    assert "2.14" in said
+    assert not (tmp_path / "none").exists()
+
+
+def test_no_number_means_all():
+    assert chosen([]) == FIGURES
