@@ -4,6 +4,7 @@ from ocp.constraint import Box, Constraint
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.evaluate import Evaluation, costates_along, evaluate
+from ocp.expressions import instance, whole
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
@@ -53,7 +54,9 @@ __all__ = [
     "derive",
     "evaluate",
     "hamiltonian",
+    "instance",
     "interpolate",
     "solve",
     "symbol_kind",
+    "whole",
 ]
