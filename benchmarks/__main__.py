@@ -37,7 +37,7 @@ BENCH_METHODS = (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 if every claim that was checked holds."""
     options = _parser().parse_args(arguments)
-    console = Console(width=None if sys.stdout.isatty() else 140)
+    console = Console(width=None if sys.stdout.isatty() else 170)
     if options.command == "list":
         return _list(console)
     if options.command == "bench":

@@ -6,6 +6,8 @@ from statistics import median
 
 from benchmarks.row import Row
 
+# A trajectory that violates a constraint by more may gain by it.
+FEASIBLE = 1e-6
 # A referee's cost this far below a reference, relative: the reference is wrong.
 BELOW_REFERENCE = 1e-6
 
@@ -20,17 +22,18 @@ class Claim:
 
 
 def below_reference(rows: Iterable[Row]) -> tuple[Row, ...]:
-    """Return the rows that cost less than the best known: each disproves its reference."""
+    """Return the rows that cost less than the best known, whatever their status.
+
+    Each disproves its reference.
+    """
     return tuple(
         row
         for row in rows
-        if row.solved and row.gap is not None and row.gap < -BELOW_REFERENCE - _slack(row)
+        if row.gap is not None
+        and row.gap < -BELOW_REFERENCE
+        and row.violation is not None
+        and row.violation <= FEASIBLE
     )
-
-
-def _slack(row: Row) -> float:
-    """What a trajectory that violates a constraint may gain by it."""
-    return 10.0 * (row.violation or 0.0)
 
 
 def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
@@ -67,8 +70,9 @@ def _gap_claim(rows: Sequence[Row]) -> Claim | None:
 
 
 def _refinement_claim(coarse: Sequence[Row], fine: Sequence[Row]) -> Claim | None:
-    finer = {row.case: _gap(row) for row in fine}
-    ratios = [finer[row.case] / _gap(row) for row in coarse if row.case in finer]
+    finer = {row.case: row for row in fine}
+    pairs = [(row, finer[row.case]) for row in coarse if row.case in finer]
+    ratios = [_gap(b) / _gap(a) if a.solved and b.solved else float("inf") for a, b in pairs]
     if not ratios:
         return None
     good = sum(ratio <= 0.35 for ratio in ratios)

@@ -128,6 +128,8 @@ def _with_local_gap(solver: Solver) -> Callable[[Case, Settings], Outcome]:
     def run(case: Case, settings: Settings) -> Outcome:
         outcome = _plain(solver)(case, settings)
         bottom = _plain_from(MultipleShooting(INTERVALS), case, outcome.solution)
+        if not bottom.solution.status.is_success:
+            return outcome
         gap = outcome.verdict.cost / bottom.verdict.cost - 1.0
         return Outcome(outcome.solution, outcome.verdict, gap)
 
@@ -147,10 +149,6 @@ def _method(
     about: str,
 ) -> Method:
     return Method(name, family, frozenset(suites.split()), run, repr(solver), about)
-
-
-def _single(name: str, solver: IndirectShooting, guess: Guess | None, about: str) -> Method:
-    return _method(name, "indirect", "arm", _plain(solver, guess), solver, about)
 
 
 def all_methods() -> tuple[Method, ...]:

@@ -5,6 +5,7 @@ from ocp.data import Data
 from ocp.discretise import discretise
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.evaluate import Evaluation, costates_along, evaluate
+from ocp.expressions import instance, whole
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
@@ -63,11 +64,13 @@ __all__ = [
     "discretise",
     "evaluate",
     "hamiltonian",
+    "instance",
     "interpolate",
     "linear_quadratic",
     "solve",
     "stationary",
     "symbol_kind",
+    "whole",
     "with_input_rate",
     "with_stationary_end",
 ]

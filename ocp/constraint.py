@@ -45,10 +45,10 @@ class Box:
         return np.clip(value, np.asarray(self.lower, float), np.asarray(self.upper, float))
 
     def excess(self, value: np.ndarray) -> np.ndarray:
-        """Return by how much each component lies outside, 0 inside."""
+        """Return by how much each component lies outside: 0 inside, inf where it is no number."""
         below = np.asarray(self.lower, float) - value
         above = value - np.asarray(self.upper, float)
-        return np.maximum(0.0, np.maximum(below, above))
+        return np.nan_to_num(np.maximum(0.0, np.maximum(below, above)), nan=np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,6 +72,21 @@ def numeric(values: ArrayLike, what: str) -> np.ndarray:
         raise ProblemError(f"{what} is not numeric: {values!r}") from error
 
 
+def whole(value: object, what: str, *, least: int = 1) -> int:
+    """Return ``value`` if it is a whole number of at least ``least``, or raise ``ProblemError``."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ProblemError(f"{what} must be a whole number of at least {least}, not {value!r}")
+    return int(value)
+
+
+def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
+    """Raise ``ProblemError`` unless ``value`` is of a kind."""
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        names = " or ".join(k.__name__ for k in kinds)
+        raise ProblemError(f"{what} is a {type(value).__name__}, {names} is needed")
+
+
 def numbers(values: ArrayLike, size: int, what: str, *, finite: bool = True) -> np.ndarray:
     """Return ``values`` as a read-only float vector (size,); one number is repeated.
 

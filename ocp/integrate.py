@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
-from ocp.errors import ProblemError
+from ocp.expressions import whole
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -29,8 +29,7 @@ class Integrator(ABC):
 
     def __post_init__(self) -> None:
         """Check the number of substeps."""
-        if self.steps < 1:
-            raise ProblemError(f"an integrator needs at least one step, not {self.steps}")
+        whole(self.steps, "an integrator's number of steps")
 
     def __call__(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
         """Return z(s + h) for dz/ds = rate(z, s)."""

@@ -139,7 +139,8 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     x, costate, t, p = inputs
     slope = h.control_gradient(x, u, costate, t, p)
     residual = u - _clip(u - slope, box) if box.is_active else slope
-    options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50, "error_on_fail": False}
+    options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50}
+    options |= {"error_on_fail": False, "show_eval_warnings": False}
     given = ca.vertcat(*inputs)
     root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
     guess = box.clip(np.zeros(m.nu))

@@ -12,7 +12,13 @@ from numpy.typing import ArrayLike
 from ocp.constraint import Box, Constraint
 from ocp.describe import describe
 from ocp.errors import ProblemError
-from ocp.expressions import element_names, numbers, refuse_foreign_symbols, scalar
+from ocp.expressions import (
+    element_names,
+    instance,
+    numbers,
+    refuse_foreign_symbols,
+    scalar,
+)
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.model import Model
@@ -94,6 +100,7 @@ class OCP:
 
     def __post_init__(self) -> None:
         """Check every shape, symbol and number, and stack what was given loosely."""
+        self._check_kinds()
         model = self.model
         set_ = object.__setattr__
         set_(self, "x0", numbers(self.x0, model.nx, f"{self.name}: x0"))
@@ -190,6 +197,23 @@ class OCP:
         return describe(self)
 
     # -- checks at construction -----------------------------------------------------
+
+    def _check_kinds(self) -> None:
+        instance(self.model, Model, f"{self.name}: model")
+        instance(self.control_bounds, Box, f"{self.name}: control_bounds")
+        instance(self.state_bounds, Box, f"{self.name}: state_bounds")
+        if self.guess is not None and not hasattr(self.guess, "sample"):
+            instance(self.guess, Guess, f"{self.name}: guess")
+        for what, kind in (
+            ("constraints", Constraint),
+            ("invariants", Constraint),
+            ("parameters", (Parameter, Signal)),
+        ):
+            entries = getattr(self, what)
+            instance(entries, (tuple, list), f"{self.name}: {what}")
+            for entry in entries:
+                instance(entry, kind, f"{self.name}: an entry of {what}")
+            object.__setattr__(self, what, tuple(entries))
 
     def _check_names(self) -> None:
         for kind, entries in (

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, Transcription, UnsupportedProblem, Work
+from ocp import ProblemError, Transcription, UnsupportedProblem, Work, whole
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,9 @@ class Backend:
         """Check the options."""
         if self.name not in ("ipopt", "fatrop"):
             raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
-        if self.max_iterations < 1 or not self.tolerance > 0.0:
-            raise ProblemError("a backend needs at least one iteration and a positive tolerance")
+        whole(self.max_iterations, "a backend's max_iterations")
+        if not self.tolerance > 0.0:
+            raise ProblemError("a backend needs a positive tolerance")
 
     def build(self, transcription: Transcription) -> "Nlp":
         """Set the backend up for a transcribed problem.

@@ -24,6 +24,8 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    instance,
+    whole,
 )
 from solvers.extremal import Extremals, Paths, Schedule
 from solvers.newton import NewtonResult, Solve, newton
@@ -134,10 +136,9 @@ class IndirectShooting(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.segments < 1 or self.steps < self.segments:
-            raise ProblemError(
-                f"indirect shooting needs 1 <= segments <= steps, not {self.segments}, {self.steps}"
-            )
+        whole(self.segments, "indirect shooting: segments")
+        whole(self.steps, "indirect shooting: steps", least=self.segments)
+        instance(self.integrator, Integrator, "indirect shooting: integrator")
         if self.max_steps < 1 or not (self.tolerance > 0.0 and self.delta > 0.0):
             raise ProblemError(
                 "indirect shooting needs at least one Newton step, positive tolerance and delta"
@@ -308,6 +309,12 @@ class IndirectShootingProgram(Program):
             message = message or "the cost is not finite along the extremal"
             t, x, costate, u = self._still(data)
             cost = np.inf
+        elif status is Status.STATIONARY and ext.ocp.time_box.excess(np.array([duration]))[0] > 0.0:
+            status = Status.FAILED
+            message = (
+                f"the stationary final time, {duration:.4g} s, is outside its bounds, which "
+                "this method does not impose: use a direct method"
+            )
         elif status is Status.STATIONARY:
             concave = concave_at(ext, paths, schedule, duration, below=-_CONCAVE)
             if concave is not None:

@@ -26,6 +26,8 @@ from ocp import (
     Status,
     Transcription,
     Work,
+    instance,
+    whole,
 )
 from solvers.backend import Answer, Backend, Nlp
 from solvers.feasibility import Feasibility
@@ -68,10 +70,8 @@ class MultipleShooting(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.intervals < 1:
-            raise ProblemError(
-                f"multiple shooting needs at least one interval, not {self.intervals}"
-            )
+        whole(self.intervals, "multiple shooting: intervals")
+        instance(self.integrator, Integrator, "multiple shooting: integrator")
         if not self.accuracy > 0.0:
             raise ProblemError(f"the accuracy must be positive, not {self.accuracy}")
         self.options  # noqa: B018 - checks its own
@@ -202,8 +202,6 @@ class MultipleShootingProgram(Program):
                 return Status.SOLVED, ""
             t = self._times(answer, data)[node]
             return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t:.4g} s"
-        if answer.word in _INFEASIBLE or answer.success:
-            return Status.INFEASIBLE, where
         if answer.count >= self.solver.max_iterations:
             return Status.ITERATION_LIMIT, where
         if answer.word == "Diverging_Iterates":
@@ -277,10 +275,8 @@ class MultipleShootingProgram(Program):
         )
 
 
-_INFEASIBLE = ("Infeasible_Problem_Detected", "Restoration_Failed", "Not_Enough_Degrees_Of_Freedom")
 # An optimiser that cannot meet a constraint may also exploit the integrator's error to do so.
 _MAYBE_INFEASIBLE = (
-    Status.INFEASIBLE,
     Status.ITERATION_LIMIT,
     Status.FAILED,
     Status.INACCURATE,

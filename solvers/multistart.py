@@ -6,9 +6,11 @@ from time import perf_counter
 import numpy as np
 
 from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
+from solvers.indirect_shooting import IndirectShooting
 
-# Two answers whose true costs agree to this are the same optimum.
+# Two answers whose true costs and states agree to this, relative, are the same optimum.
 _SAME_COST = 1e-4
+_SAME_STATES = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ def multistart(
 
     Args:
         ocp: the problem; built once.
-        solver: any solver.
+        solver: any solver that starts from controls: not indirect shooting.
         starts: how many, the problem's own included.
         seed: of the random controls; the same seed gives the same starts.
         amplitude: standard deviation of the controls, in their own units (where a control is
@@ -54,8 +56,10 @@ def multistart(
         optima with their true costs; empty if no start succeeded.
 
     Raises:
-        ProblemError: if there is no start.
+        ProblemError: if there is no start, or the solver does not start from controls.
     """
+    if isinstance(solver, IndirectShooting):
+        raise ProblemError("indirect shooting starts from costates: polish the optima instead")
     if starts < 1:
         raise ProblemError(f"multistart needs at least one start, not {starts}")
     started = perf_counter()
@@ -84,9 +88,17 @@ def _random_guesses(ocp: OCP, number: int, seed: int, amplitude: float) -> list[
     return [Guess(u=waves.T @ shape) for shape in shapes]
 
 
+def _is_same(one: LocalOptimum, other: LocalOptimum) -> bool:
+    """Whether cost and states agree: a mirror image has the same cost."""
+    if abs(one.cost - other.cost) > _SAME_COST * (1.0 + abs(one.cost)):
+        return False
+    x, y = one.solution.x, other.solution.x
+    return bool(np.abs(x - y).max() <= _SAME_STATES * (1.0 + np.abs(x).max()))
+
+
 def _merged(found: list[LocalOptimum], new: LocalOptimum) -> list[LocalOptimum]:
     for i, old in enumerate(found):
-        if abs(old.cost - new.cost) <= _SAME_COST * (1.0 + abs(old.cost)):
+        if _is_same(old, new):
             better = min(old, new, key=lambda optimum: optimum.cost)
             merged = LocalOptimum(better.solution, better.cost, old.found + 1)
             return [*found[:i], merged, *found[i + 1 :]]

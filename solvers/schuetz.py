@@ -25,6 +25,8 @@ from ocp import (
     UnsupportedProblem,
     Work,
     hamiltonian,
+    instance,
+    whole,
 )
 from solvers.line_search import Armijo, FixedStep, StepRule, Trial
 
@@ -68,8 +70,10 @@ class Schuetz(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.intervals < 1 or self.max_iterations < 1:
-            raise ProblemError("Schuetz needs at least one interval and one iteration")
+        whole(self.intervals, "Schuetz: intervals")
+        whole(self.max_iterations, "Schuetz: max_iterations")
+        instance(self.integrator, Integrator, "Schuetz: integrator")
+        instance(self.step, (FixedStep, Armijo), "Schuetz: step")
         if self.decrease < 0.0 or self.stationarity < 0.0:
             raise ProblemError("Schuetz: decrease and stationarity must not be negative")
         if self.direction not in ("steepest", "fletcher-reeves", "polak-ribiere"):

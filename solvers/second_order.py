@@ -52,14 +52,18 @@ def second_order(
         return SecondOrder(False, f"H_uu is not positive definite at t = {concave:.4g} s")
     plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
     slopes, _ = extremals.step_slopes(paths, schedule, duration)
+    # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
+    grown = _is_regular(plane[:nx])
     for k in range(len(slopes) - 1, -1, -1):
         back = np.linalg.inv(slopes[k])
         before = back @ plane
-        # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
-        if _is_regular(plane[:nx]) and _turns_over(plane[:nx], before[:nx], back[:nx, :nx]):
+        turned = grown and _turns_over(plane[:nx], before[:nx], back[:nx, :nx])
+        plane = _orthonormal(before)
+        regular = _is_regular(plane[:nx])
+        if turned or (grown and not regular):
             t = schedule.t0 + schedule.fractions[k] * duration
             return SecondOrder(False, f"conjugate point near t = {t:.4g} s")
-        plane = _orthonormal(before)
+        grown = grown or regular
     if ocp.has_free_start:
         return _tangent_curvature(extremals, plane, z[0], mu, schedule)
     return SecondOrder(True)

@@ -90,3 +90,9 @@ def test_constraint_stacks_its_rows_and_sizes_its_bounds() -> None:
 def test_constraint_refuses(expression: object, bounds: tuple, at: str, message: str) -> None:
     with pytest.raises(ProblemError, match=message):
         Constraint("c", expression, *bounds, at=at)  # type: ignore[arg-type]
+
+
+def test_what_is_no_number_is_outside_every_box() -> None:
+    assert Box(-1.0, 1.0).sized(2, "v").excess(np.array([[0.0, np.nan]])).tolist() == [
+        [0.0, np.inf]
+    ]

@@ -52,7 +52,7 @@ def test_substeps_are_steps(kind: type[Integrator]) -> None:
 
 
 def test_refuses_no_steps() -> None:
-    with pytest.raises(ProblemError, match="at least one step, not 0"):
+    with pytest.raises(ProblemError, match="at least 1, not 0"):
         RK4(steps=0)
 
 

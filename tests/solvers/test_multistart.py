@@ -1,11 +1,12 @@
 """Many starts: distinct optima, sorted, counted, the same for the same seed."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
 from models import double_integrator_energy, van_der_pol
-from ocp import Box, Constraint, ProblemError, Status, evaluate
+from ocp import OCP, Box, Constraint, Model, ProblemError, Status, evaluate
 from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart
 from tests.solvers.problems import changed, ends, point
 from tests.tolerances import CERTIFIED
@@ -68,9 +69,25 @@ def test_what_the_referee_sees_violated_does_not_count() -> None:
     assert multistart(ocp, MultipleShooting(5), 1, 0, violation=0.0) == ()
 
 
-def test_any_solver() -> None:
-    found = multistart(double_integrator_energy(), IndirectShooting(), 2, 0)
-    assert found[0].cost == pytest.approx(6.0, rel=CERTIFIED)
+def test_refuses_what_does_not_start_from_controls() -> None:
+    with pytest.raises(ProblemError, match="polish the optima"):
+        multistart(double_integrator_energy(), IndirectShooting(), 2, 0)
+
+
+def test_a_mirror_image_is_another_optimum() -> None:
+    """From y = 0 between two equal wells at -1 and 1."""
+    y, u = ca.SX.sym("y"), ca.SX.sym("u")
+    ocp = OCP(
+        name="two wells",
+        model=Model(name="integrator", x=y, u=u, f=u),
+        x0=0.0,
+        horizon=3.0,
+        running_cost=u**2 / 10 + 4 * (y**2 - 1) ** 2,
+    )
+    optima = multistart(ocp, MultipleShooting(30), 8, 0)
+    ends = sorted(float(optimum.solution.x[-1, 0]) for optimum in optima[:2])
+    assert ends[0] < -0.9
+    assert ends[1] > 0.9
 
 
 def test_no_start_is_refused() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models import double_integrator_energy, van_der_pol
-from ocp import OCP, Model, Solution, Status, solve
+from ocp import OCP, Constraint, Model, Solution, Status, solve
 from solvers import IndirectShooting, MultipleShooting, SecondOrder, polish
 from tests.solvers.problems import (
     circle_start,
@@ -101,3 +101,26 @@ def test_polish_says_why_an_extremal_is_no_minimum() -> None:
     solution = polish(solve(ocp, IndirectShooting()))
     assert solution.status is Status.STATIONARY
     assert "conjugate point" in solution.message
+
+
+@pytest.mark.parametrize(
+    ("duration", "fixed_end"), [(np.pi, False), (np.pi / 2, False), (np.pi, True)]
+)
+def test_a_conjugate_point_on_a_node_is_seen(duration: float, fixed_end: bool) -> None:
+    """L = (u^2 - x^2) / 2: X = cos(T - t) with a free end, sin(T - t) with a fixed one.
+
+    Its zeros are at T - t = pi / 2, in the middle or at t0, and at T - t = pi, at t0.
+    """
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    end = (Constraint("end", x, 0.0, 0.0, at="terminal"),) if fixed_end else ()
+    ocp = OCP(
+        name="oscillator",
+        model=Model(name="oscillator", x=x, u=u, f=u),
+        x0=0.0,
+        horizon=duration,
+        running_cost=(u**2 - x**2) / 2,
+        constraints=end,
+    )
+    _, verdict = judged(ocp)
+    assert verdict.passed is False
+    assert verdict.reason.startswith("conjugate point")
