@@ -2,16 +2,13 @@
 
 from solvers.batch import Batch
 from solvers.bellman import Table
+from solvers.continuation import HorizonContinuation, ParameterContinuation
 from solvers.gpc import GPC, GPCLaw
 from solvers.gpc_loop import GPCRun, gpc_loop
 from solvers.greedy import Greedy
 from solvers.grid import Axis
 from solvers.grid_dp import GridDP
-from solvers.indirect_shooting import (
-    HorizonContinuation,
-    IndirectShooting,
-    ParameterContinuation,
-)
+from solvers.indirect_shooting import IndirectShooting
 from solvers.line_search import Armijo, FixedStep, StepRule
 from solvers.linear_mpc import LinearMPC
 from solvers.multiple_shooting import MultipleShooting

@@ -1,7 +1,7 @@
 """Indirect shooting: Newton-Raphson on the minimum principle's boundary value problem."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Literal
 
@@ -15,7 +15,6 @@ from ocp import (
     RK4,
     Data,
     Integrator,
-    ParameterValues,
     ProblemError,
     Program,
     Solution,
@@ -27,6 +26,7 @@ from ocp import (
     instance,
     whole,
 )
+from solvers.continuation import HorizonContinuation, ParameterContinuation
 from solvers.extremal import Extremals, Paths, Schedule
 from solvers.newton import NewtonResult, Solve, newton
 from solvers.second_order import SecondOrder, concave_at, second_order
@@ -34,72 +34,6 @@ from solvers.second_order import SecondOrder, concave_at, second_order
 _SMALLEST_ADVANCE = 1e-3
 # An eigenvalue of H_uu below minus this is no rounding error.
 _CONCAVE = 1e-9
-
-
-@dataclass(frozen=True)
-class HorizonContinuation:
-    """Solve a short horizon first and lengthen it, each solution starting the next.
-
-    Args:
-        first: share of the horizon to begin with, in (0, 1).
-    """
-
-    first: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check the share."""
-        if not 0.0 < self.first < 1.0:
-            raise ProblemError(f"continuation: first = {self.first}, it must lie in (0, 1)")
-
-    def check(self, ocp: OCP) -> None:
-        """Refuse a free final time: the optimiser, not the share, then sets the horizon."""
-        if ocp.has_free_time:
-            raise UnsupportedProblem(
-                f"{ocp.name}: no continuation in the horizon where the final time is free"
-            )
-
-    def applied(self, data: Data, share: float) -> tuple[Data, float]:
-        """Return the data, and the share of the horizon to integrate."""
-        return data, share
-
-
-@dataclass(frozen=True)
-class ParameterContinuation:
-    """Solve with an easy value of a parameter first and move it to the wanted one.
-
-    Args:
-        name: of a ``Parameter`` (or ``Signal``) of the problem.
-        easy: its easy value.
-        first: share of the way to begin with, in [0, 1).
-    """
-
-    name: str
-    easy: ArrayLike
-    first: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the share."""
-        if not 0.0 <= self.first < 1.0:
-            raise ProblemError(f"continuation: first = {self.first}, it must lie in [0, 1)")
-
-    def check(self, ocp: OCP) -> None:
-        """Refuse a name that the problem does not know, and a value that does not fit."""
-        entries = {entry.name: entry for entry in ocp.parameters}
-        if self.name not in entries:
-            raise ProblemError(
-                f"continuation: '{self.name}' is no parameter of {ocp.name}; "
-                f"it has {', '.join(entries) or 'none'}"
-            )
-        shape, wanted = np.shape(self.easy), np.shape(entries[self.name].value)
-        if shape not in ((), wanted):
-            raise ProblemError(f"continuation: easy has shape {shape}, {wanted} is needed")
-
-    def applied(self, data: Data, share: float) -> tuple[Data, float]:
-        """Return the data with the parameter moved by ``share``, and the whole horizon."""
-        wanted = data.values.as_dict()
-        easy = np.broadcast_to(np.asarray(self.easy, dtype=float), wanted[self.name].shape)
-        moved = {**wanted, self.name: easy + share * (wanted[self.name] - easy)}
-        return replace(data, values=ParameterValues.of(data.values.entries, moved)), 1.0
 
 
 @dataclass(frozen=True)

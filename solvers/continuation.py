@@ -1,0 +1,74 @@
+"""Where Newton fails from a guess: an easier problem first, moved to the wanted one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import OCP, Data, ParameterValues, ProblemError, UnsupportedProblem
+
+
+@dataclass(frozen=True)
+class HorizonContinuation:
+    """Solve a short horizon first and lengthen it, each solution starting the next.
+
+    Args:
+        first: share of the horizon to begin with, in (0, 1).
+    """
+
+    first: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the share."""
+        if not 0.0 < self.first < 1.0:
+            raise ProblemError(f"continuation: first = {self.first}, it must lie in (0, 1)")
+
+    def check(self, ocp: OCP) -> None:
+        """Refuse a free final time: the optimiser, not the share, then sets the horizon."""
+        if ocp.has_free_time:
+            raise UnsupportedProblem(
+                f"{ocp.name}: no continuation in the horizon where the final time is free"
+            )
+
+    def applied(self, data: Data, share: float) -> tuple[Data, float]:
+        """Return the data, and the share of the horizon to integrate."""
+        return data, share
+
+
+@dataclass(frozen=True)
+class ParameterContinuation:
+    """Solve with an easy value of a parameter first and move it to the wanted one.
+
+    Args:
+        name: of a ``Parameter`` (or ``Signal``) of the problem.
+        easy: its easy value.
+        first: share of the way to begin with, in [0, 1).
+    """
+
+    name: str
+    easy: ArrayLike
+    first: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the share."""
+        if not 0.0 <= self.first < 1.0:
+            raise ProblemError(f"continuation: first = {self.first}, it must lie in [0, 1)")
+
+    def check(self, ocp: OCP) -> None:
+        """Refuse a name that the problem does not know, and a value that does not fit."""
+        entries = {entry.name: entry for entry in ocp.parameters}
+        if self.name not in entries:
+            raise ProblemError(
+                f"continuation: '{self.name}' is no parameter of {ocp.name}; "
+                f"it has {', '.join(entries) or 'none'}"
+            )
+        shape, wanted = np.shape(self.easy), np.shape(entries[self.name].value)
+        if shape not in ((), wanted):
+            raise ProblemError(f"continuation: easy has shape {shape}, {wanted} is needed")
+
+    def applied(self, data: Data, share: float) -> tuple[Data, float]:
+        """Return the data with the parameter moved by ``share``, and the whole horizon."""
+        wanted = data.values.as_dict()
+        easy = np.broadcast_to(np.asarray(self.easy, dtype=float), wanted[self.name].shape)
+        moved = {**wanted, self.name: easy + share * (wanted[self.name] - easy)}
+        return replace(data, values=ParameterValues.of(data.values.entries, moved)), 1.0
