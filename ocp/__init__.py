@@ -2,25 +2,25 @@
 
 from ocp.constraint import Box, Constraint
 from ocp.data import Data
-from ocp.discretise import discretise
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
-from ocp.evaluate import Evaluation, costates_along, evaluate
 from ocp.expressions import instance, whole
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
-from ocp.input_rate import with_input_rate
 from ocp.integrate import RK4, Euler, Integrator, Midpoint, Stage, interpolate
-from ocp.linear_quadratic import LinearQuadratic, LQData, Matrices
+from ocp.linear.discretise import discretise
+from ocp.linear.input_rate import with_input_rate
+from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
+from ocp.linear.stationary import Stationary, stationary, with_stationary_end
+from ocp.linear.structure import linear_quadratic
 from ocp.model import Model
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
 from ocp.problem import OCP, FreeTime
+from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution import Solution, Work
 from ocp.solver import Program, Solver, Start, solve
-from ocp.stationary import Stationary, stationary, with_stationary_end
 from ocp.status import Status
-from ocp.structure import linear_quadratic
 from ocp.transcription import Row, Transcription
 
 __all__ = [

@@ -1,22 +1,22 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
-from solvers.batch import Batch
-from solvers.bellman import Table
-from solvers.continuation import HorizonContinuation, ParameterContinuation
-from solvers.gpc import GPC, GPCLaw
-from solvers.gpc_loop import GPCRun, gpc_loop
-from solvers.greedy import Greedy
-from solvers.grid import Axis
-from solvers.grid_dp import GridDP
-from solvers.indirect_shooting import IndirectShooting
-from solvers.line_search import Armijo, FixedStep, StepRule
-from solvers.linear_mpc import LinearMPC
-from solvers.multiple_shooting import MultipleShooting
+from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.gradient.line_search import Armijo, FixedStep, StepRule
+from solvers.gradient.schuetz import Schuetz
+from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
+from solvers.indirect.indirect_shooting import IndirectShooting
+from solvers.indirect.second_order import SecondOrder, second_order
+from solvers.linear.batch import Batch
+from solvers.linear.linear_mpc import LinearMPC
+from solvers.linear.riccati import Riccati
 from solvers.multistart import LocalOptimum, multistart
 from solvers.polish import polish
-from solvers.riccati import Riccati
-from solvers.schuetz import Schuetz
-from solvers.second_order import SecondOrder, second_order
+from solvers.predictive.gpc import GPC, GPCLaw
+from solvers.predictive.gpc_loop import GPCRun, gpc_loop
+from solvers.tabular.bellman import Table
+from solvers.tabular.greedy import Greedy
+from solvers.tabular.grid import Axis
+from solvers.tabular.grid_dp import GridDP
 
 __all__ = [
     "GPC",

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
-from solvers.indirect_shooting import IndirectShooting
+from solvers.indirect.indirect_shooting import IndirectShooting
 
 # Two answers whose true costs and states agree to this, relative, are the same optimum.
 _SAME_COST = 1e-4

@@ -4,8 +4,8 @@ from dataclasses import replace
 from time import perf_counter
 
 from ocp import Solution, Status, UnsupportedProblem
-from solvers.indirect_shooting import IndirectShooting
-from solvers.multiple_shooting import MultipleShooting
+from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.indirect.indirect_shooting import IndirectShooting
 
 SEGMENTS, STEPS = 15, 300
 _MOST_STEPS = 2**16

@@ -7,7 +7,7 @@ import pytest
 from models import Carima, CarimaPlant, carima_ocp
 from ocp import OCP, Box, ProblemError, Status, solve
 from solvers import GPC, LinearMPC, MultipleShooting, gpc_loop
-from solvers.diophantine import diophantine
+from solvers.predictive.diophantine import diophantine
 from tests.tolerances import ROUNDING
 
 THESIS = Carima([1.0, -0.8], [0.4, 0.6])

@@ -17,7 +17,7 @@ from ocp import (
     solve,
 )
 from solvers import Axis, GridDP, MultipleShooting
-from solvers.grid import Grid
+from solvers.tabular.grid import Grid
 from tests.linear_dp.problems import line, scalar, scalar_cost, tracking, unstable_mass, walk
 from tests.tolerances import ROUNDING
 

@@ -20,8 +20,8 @@ from ocp import (
     costates_along,
     evaluate,
 )
-from ocp.march import March
-from ocp.truth import follow
+from ocp.referee.march import March
+from ocp.referee.truth import follow
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, lag, pendulum, trajectory

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.cases import arm_scenario
 from models import van_der_pol
 from ocp import OCP, RK4, Data
-from solvers.extremal import Extremals, Schedule
+from solvers.indirect.extremal import Extremals, Schedule
 from tests.ocp.differences import jacobian
 from tests.solvers.problems import (
     circle_start,

@@ -7,7 +7,7 @@ import pytest
 
 from ocp import ProblemError
 from solvers import Armijo, FixedStep
-from solvers.line_search import Trial
+from solvers.gradient.line_search import Trial
 
 
 def probe_of(f, seen: list[float] | None = None):

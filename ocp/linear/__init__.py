@@ -1,0 +1,1 @@
+"""Problems with linear dynamics and quadratic cost: recognise, read, discretise."""

@@ -1,0 +1,168 @@
+"""Is this problem linear-quadratic? Its matrices, or the term that is not."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ocp.constraint import Box, Constraint
+from ocp.errors import UnsupportedProblem
+from ocp.linear.linear_quadratic import LinearQuadratic
+from ocp.linear.polynomial import beyond
+from ocp.problem import OCP
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Symbolic coefficients of a problem, free of x and u: functions of t and parameters.
+
+    Dynamics A x + B u + c; running cost x'Qx + 2x'Su + u'Ru + 2q'x + 2r'u + constant.
+    """
+
+    A: ca.SX
+    B: ca.SX
+    c: ca.SX
+    Q: ca.SX
+    S: ca.SX
+    R: ca.SX
+    q: ca.SX
+    r: ca.SX
+    constant: ca.SX
+
+
+def linear_quadratic(ocp: OCP) -> LinearQuadratic:
+    """Read the matrices of a discrete-time linear-quadratic problem off its expressions.
+
+    Source: thesis (2.1) to (2.3), (2.14), (2.82).
+
+    Raises:
+        UnsupportedProblem: naming the term that is not linear or quadratic, or the weight that
+            is indefinite with its eigenvalue; for a continuous model, which ``discretise``
+            makes discrete; for a start on a manifold.
+    """
+    if not ocp.model.is_discrete:
+        raise UnsupportedProblem(
+            f"{ocp.name}: the model is continuous in time; make it discrete: discretise(ocp, dt)"
+        )
+    if ocp.has_free_start:
+        raise UnsupportedProblem(
+            f"{ocp.name}: initial constraint '{ocp.at('initial')[0].name}': "
+            "the linear solvers need a fixed start"
+        )
+    lq = _assemble(ocp, read_terms(ocp))
+    complaint = lq.sample_matrices(lq.declared).indefinite()
+    if complaint:
+        raise UnsupportedProblem(f"{ocp.name}: {complaint}")
+    return lq
+
+
+def read_terms(ocp: OCP) -> Terms:
+    """Return the coefficients of dynamics and running cost, symbolically.
+
+    Raises:
+        UnsupportedProblem: naming the term that is not linear or not quadratic.
+    """
+    m = ocp.model
+    require_degree(ocp, m.f, 1, "the dynamics f")
+    require_degree(ocp, ca.SX(ocp.running_cost), 2, "running_cost")
+    require_degree(ocp, ca.SX(ocp.terminal_cost), 2, "terminal_cost")
+    hessian, slope, constant = _quadratic(ca.SX(ocp.running_cost), ca.vertcat(m.x, m.u))
+    n, (a_b, c) = m.nx, _affine(m.f, ca.vertcat(m.x, m.u))
+    return Terms(
+        A=a_b[:, :n],
+        B=a_b[:, n:],
+        c=c,
+        Q=hessian[:n, :n] / 2,
+        S=hessian[:n, n:] / 2,
+        R=hessian[n:, n:] / 2,
+        q=slope[:n] / 2,
+        r=slope[n:] / 2,
+        constant=constant,
+    )
+
+
+def require_degree(ocp: OCP, expression: ca.SX, degree: int, what: str) -> None:
+    """Raise ``UnsupportedProblem`` with the offending term where a degree is exceeded."""
+    rows = ca.vertsplit(expression) if expression.numel() else []
+    for i, row in enumerate(rows):
+        term = beyond(row, ocp.model.x, ocp.model.u, degree)
+        if term:
+            which = f"{what}[{i}]" if len(rows) > 1 else what
+            kind = "linear" if degree == 1 else "quadratic"
+            raise UnsupportedProblem(f"{ocp.name}: {which} is not {kind} in {term}")
+
+
+def _affine(expression: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return slope and value at zero of a linear column."""
+    zero = ca.DM.zeros(v.numel())
+    slope = ca.densify(ca.jacobian(expression, v))
+    return ca.substitute(slope, v, zero), ca.substitute(expression, v, zero)
+
+
+def _quadratic(expression: ca.SX, v: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return Hessian, slope at zero and value at zero of a quadratic scalar."""
+    zero = ca.DM.zeros(v.numel())
+    hessian, gradient = ca.hessian(expression, v)
+    at_zero = [ca.densify(ca.substitute(e, v, zero)) for e in (hessian, gradient, expression)]
+    return at_zero[0], at_zero[1], at_zero[2]
+
+
+def _assemble(ocp: OCP, terms: Terms) -> LinearQuadratic:
+    m, s = ocp.model, terms
+    inputs, v = [m.t, ocp.p], ca.vertcat(m.x, m.u)
+    for c in ocp.constraints:
+        require_degree(ocp, c.expression, 1, f"{c.at} constraint '{c.name}'")
+    path = [*_path_rows(ocp.at("path")), *_box_rows(ocp.state_bounds, m.x)]
+    on_control = [ca.which_depends(r.expression, m.u, 1, True)[0] for r in path]
+    bounds = _box_rows(ocp.control_bounds, m.u)
+    rows = path + bounds
+    end = [r for r, depends in zip(path, on_control, strict=True) if not depends]
+    end += _path_rows(ocp.at("terminal"))
+    d, d_0 = _affine(_stack(rows), v)
+    d_f, d_f0 = _affine(_stack(end), m.x)
+    hessian, slope, constant = _quadratic(ca.SX(ocp.terminal_cost), m.x)
+    blocks = [s.A, s.B, s.Q, s.S, s.R, d[:, : m.nx], d[:, m.nx :]]
+    vectors = ca.vertcat(s.c, s.q, s.r, s.constant, d_0)
+    end_vectors = ca.vertcat(slope / 2, constant, d_f0)
+    return LinearQuadratic(
+        ocp=ocp,
+        rows=tuple(r.name for r in rows),
+        end_rows=tuple(r.name for r in end),
+        on_control=np.array(on_control + [True] * len(bounds), dtype=bool),
+        is_control_bound=np.array([False] * len(path) + [True] * len(bounds), dtype=bool),
+        stage_matrices=ca.Function("stage_matrices", inputs, [ca.densify(b) for b in blocks]),
+        stage_vectors=ca.Function("stage_vectors", inputs, [ca.densify(vectors)]),
+        end_matrices=ca.Function("end_matrices", inputs, [hessian / 2, ca.densify(d_f)]),
+        end_vectors=ca.Function("end_vectors", inputs, [ca.densify(end_vectors)]),
+        row_box=_box(rows),
+        end_box=_box(end),
+    )
+
+
+def _path_rows(constraints: tuple[Constraint, ...]) -> list[Constraint]:
+    """Return every row of constraints as a constraint of its own."""
+    return [
+        Constraint(c.name, c.expression[i], np.asarray(c.lower)[i], np.asarray(c.upper)[i])
+        for c in constraints
+        for i in range(c.size)
+    ]
+
+
+def _box_rows(box: Box, symbols: ca.SX) -> list[Constraint]:
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    return [
+        Constraint(f"bound of {symbols[i]}", symbols[i], lower[i], upper[i])
+        for i in range(symbols.numel())
+        if np.isfinite(lower[i]) or np.isfinite(upper[i])
+    ]
+
+
+def _stack(rows: list[Constraint]) -> ca.SX:
+    return ca.vertcat(ca.SX(0, 1), *[r.expression for r in rows])
+
+
+def _box(rows: list[Constraint]) -> Box:
+    return Box(
+        np.array([np.asarray(r.lower)[0] for r in rows]),
+        np.array([np.asarray(r.upper)[0] for r in rows]),
+    )

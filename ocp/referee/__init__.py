@@ -1,0 +1,1 @@
+"""The referee: integrate the controls until the cost holds, then judge."""

@@ -1,0 +1,155 @@
+"""The residual of the minimum principle along the true trajectory of a solution."""
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ocp.constraint import Constraint
+from ocp.hamiltonian import hamiltonian
+from ocp.referee.truth import Truth, adjoint
+from ocp.referee.violation import path_values, stacked_box
+from ocp.solution import Solution
+
+# A constraint closer than this to its bound is taken as active, and the costate of the cost
+# alone then says nothing about optimality.
+_ACTIVE = 1e-5
+
+
+def stationarity(solution: Solution, truth: Truth) -> float | None:
+    """Return the residual of the minimum principle with the referee's own costates.
+
+    The largest of abs(u - clip(u - H_u)) over time (for held and linear controls dJ/du per
+    second of their support), of the costate's distance from the normals of the start
+    manifold, and of the natural residual of a free final time. None where a path constraint or
+    a state bound is active: its multiplier would be needed.
+    """
+    ocp = solution.problem
+    if _path_is_active(solution, truth):
+        return None
+    final, at_end = final_costate(solution, truth)
+    costates, g0, g1 = adjoint(solution, truth, final)
+    if solution.control_kind == "extremal":
+        controls, slopes = _pointwise(solution, truth, costates)
+    else:
+        controls, slopes = _averaged(solution, truth, g0, g1)
+    residual = np.abs(controls - ocp.control_bounds.clip(controls - slopes)).max(initial=0.0)
+    ends = (
+        _start_residual(solution, truth, costates[0]),
+        _time_residual(solution, truth, costates, at_end),
+    )
+    return float(max(residual, *ends))
+
+
+def _path_is_active(solution: Solution, truth: Truth) -> bool:
+    ocp = solution.problem
+    path = stacked_box(ocp.at("path"))
+    boxes = [(ocp.state_bounds, truth.x[1:])]
+    boxes += [(path, values) for values, _ in path_values(solution, truth)]
+    return any(
+        bool(
+            np.any(values <= np.asarray(box.lower) + _ACTIVE)
+            or np.any(values >= np.asarray(box.upper) - _ACTIVE)
+        )
+        for box, values in boxes
+    )
+
+
+def _pointwise(
+    solution: Solution, truth: Truth, costates: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Controls and H_u at the start of each step."""
+    gradient = hamiltonian(solution.problem).control_gradient.map(len(truth.u_start))
+    slopes = gradient(
+        truth.x[:-1].T, truth.u_start.T, costates[:-1].T, truth.t[None, :-1], truth.p_start.T
+    )
+    return truth.u_start, np.array(slopes).T
+
+
+def _averaged(
+    solution: Solution, truth: Truth, g0: np.ndarray, g1: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Controls and dJ/du of each node or interval, per second of its support."""
+    nodes, u = solution.t, solution.u
+    steps = np.diff(truth.t)
+    middle = (truth.t[1:] + truth.t[:-1]) / 2
+    interval = np.clip(np.searchsorted(nodes, middle) - 1, 0, len(nodes) - 2)
+    gradient, weight = np.zeros_like(u), np.zeros(len(u))
+    if solution.control_kind == "held":
+        np.add.at(gradient, interval, g0 + g1)
+        np.add.at(weight, interval, steps)
+    else:
+        for g, t in ((g0, truth.t[:-1]), (g1, truth.t[1:])):
+            right = (t - nodes[interval]) / np.diff(nodes)[interval]
+            for node, share in ((interval, 1.0 - right), (interval + 1, right)):
+                np.add.at(gradient, node, share[:, None] * g)
+                np.add.at(weight, node, share * steps / 2)
+    if solution.problem.model.is_discrete:
+        weight[:] = 1.0
+    return u, gradient / weight[:, None]
+
+
+def final_costate(solution: Solution, truth: Truth) -> tuple[np.ndarray, float]:
+    """Return phi_x + psi_x' nu, and phi_t + nu' psi_t, with the best multipliers.
+
+    Those of active terminal constraints are fitted to the solution's own costate.
+    """
+    functions = solution.problem.functions
+    end = (truth.x[-1], truth.t[-1], solution.data.values.at(1.0)[0])
+    phi_x, psi = (np.array(f(*end)) for f in (functions.terminal_gradient, functions.terminal))
+    phi_t, psi_x, psi_t = (np.array(v) for v in functions.terminal_slopes(*end))
+    target = solution.costate[-1] - phi_x.ravel()
+    nu = _multipliers(solution.problem.at("terminal"), psi.ravel(), psi_x, target)
+    return phi_x.ravel() + psi_x.T @ nu, float(phi_t.sum() + nu @ psi_t.ravel())
+
+
+def _multipliers(
+    constraints: tuple[Constraint, ...], value: np.ndarray, jacobian: np.ndarray, target: np.ndarray
+) -> np.ndarray:
+    """Return the multipliers for which jacobian' nu is nearest to a target.
+
+    0 where inactive, at least 0 at an upper bound, at most 0 at a lower one.
+    """
+    box = stacked_box(constraints)
+    least = np.where(value <= np.asarray(box.lower) + _ACTIVE, -np.inf, 0.0)
+    most = np.where(value >= np.asarray(box.upper) - _ACTIVE, np.inf, 0.0)
+    nu, active = np.zeros(len(value)), least < most
+    if active.any():
+        signs = (least[active], most[active])
+        nu[active] = lsq_linear(jacobian[active].T, target, signs, method="bvls").x
+    return nu
+
+
+def _start_residual(solution: Solution, truth: Truth, costate: np.ndarray) -> float:
+    """Distance of the initial costate from the normals of the start manifold."""
+    ocp = solution.problem
+    if not ocp.has_free_start:
+        return 0.0
+    begin = (truth.x[0], truth.t[0], truth.p_start[0])
+    value, normals = (
+        np.array(f(*begin)) for f in (ocp.functions.initial, ocp.functions.initial_slope)
+    )
+    mu = _multipliers(ocp.at("initial"), value.ravel(), normals, -costate)
+    return float(np.abs(costate + normals.T @ mu).max(initial=0.0))
+
+
+def _time_residual(solution: Solution, truth: Truth, costates: np.ndarray, at_end: float) -> float:
+    """Natural residual of the duration T, from dJ/dT for controls that stretch with it.
+
+    With time and signals written as fractions of the horizon,
+    dJ/dT = phi_t + nu' psi_t + mean(H + (t - t0) H_t), which is H(t_f) + phi_t + nu' psi_t
+    along an extremal without signals. By Simpson's rule over pairs of steps.
+    """
+    ocp, steps = solution.problem, len(truth.t) - 1
+    if not ocp.has_free_time:
+        return 0.0
+    h = hamiltonian(ocp)
+    now = [c.T for c in (truth.x[:-1], truth.u_start, costates[:-1], truth.t[:-1, None])]
+    then = [c.T for c in (truth.x[1:], truth.u_end, costates[1:], truth.t[1:, None])]
+    left, right = (
+        np.array(h.value.map(steps)(*at, p.T)).ravel()
+        + (at[3].ravel() - truth.t[0]) * np.array(h.time_slope.map(steps)(*at, p.T)).ravel()
+        for at, p in ((now, truth.p_start), (then, truth.p_end))
+    )
+    mean = (left[::2] + 4.0 * right[::2] + right[1::2]) @ np.diff(truth.t)[::2] / 3.0
+    duration = np.array([solution.duration])
+    slope = mean / solution.duration + at_end
+    return float(np.abs(duration - ocp.time_box.clip(duration - slope))[0])

@@ -1,0 +1,1 @@
+"""Direct methods: discretise, then optimise."""

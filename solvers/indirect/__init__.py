@@ -1,0 +1,1 @@
+"""Indirect methods: the minimum principle as a boundary value problem."""

@@ -1,0 +1,138 @@
+"""Is an extremal a minimum? The second-order test: Legendre, and no conjugate point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solvers.indirect.extremal import Extremals, Paths, Schedule
+
+# Columns of the Lagrangian plane this close to dependent count as a conjugate point.
+_SINGULAR = 1e-9
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """The outcome of the test.
+
+    Attributes:
+        passed: whether the extremal is a strict local minimum; None where the test does not
+            apply.
+        reason: what failed, and when, or why it does not apply.
+    """
+
+    passed: bool | None
+    reason: str = ""
+
+
+def second_order(
+    extremals: Extremals, v: np.ndarray, schedule: Schedule, paths: Paths
+) -> SecondOrder:
+    r"""Test the sufficient conditions of a weak local minimum along an extremal.
+
+    The solutions of the linearised canonical equations that meet the linearised end
+    conditions form a Lagrangian plane, (X, Y) (2 nx, nx) at every instant. Where
+    :math:`\det X` does not vanish before the final time, :math:`S = Y X^{-1}` is the bounded
+    solution of the Riccati equation, there is no conjugate point, and with
+    :math:`H_{uu} > 0` the extremal is a minimum [Bryson & Ho 1975, ch. 6]. On a start
+    manifold S has to be positive definite on its tangent as well. Carrying the plane instead
+    of S needs no special case for terminal constraints, where S is unbounded at the end.
+
+    Args:
+        extremals: the boundary value problem.
+        v: its solution.
+        schedule: grid of the run.
+        paths: trajectory of ``v``.
+    """
+    ocp = extremals.ocp
+    if ocp.has_free_time:
+        return SecondOrder(None, "the test is not made for a free final time")
+    z, mu, nu, duration = extremals.shape.split(v, schedule.duration)
+    concave = concave_at(extremals, paths, schedule, duration)
+    if concave is not None:
+        return SecondOrder(False, f"H_uu is not positive definite at t = {concave:.4g} s")
+    plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
+    slopes, _ = extremals.step_slopes(paths, schedule, duration)
+    # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
+    grown = _is_regular(plane[:nx])
+    for k in range(len(slopes) - 1, -1, -1):
+        back = np.linalg.inv(slopes[k])
+        before = back @ plane
+        turned = grown and _turns_over(plane[:nx], before[:nx], back[:nx, :nx])
+        plane = _orthonormal(before)
+        regular = _is_regular(plane[:nx])
+        if turned or (grown and not regular):
+            t = schedule.t0 + schedule.fractions[k] * duration
+            return SecondOrder(False, f"conjugate point near t = {t:.4g} s")
+        grown = grown or regular
+    if ocp.has_free_start:
+        return _tangent_curvature(extremals, plane, z[0], mu, schedule)
+    return SecondOrder(True)
+
+
+def _is_regular(x: np.ndarray) -> bool:
+    """Whether the columns are independent, in an orthonormal basis of the plane."""
+    return bool(np.linalg.svd(x, compute_uv=False)[-1] > _SINGULAR)
+
+
+def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
+    """Whether X became singular in one step backwards, from ``x`` to ``before``.
+
+    The step is dx = D'(x - B y) with B >= 0, so that X_before = D'(E + B S) X with real
+    eigenvalues of E + B S, all positive exactly where no direction has turned over. Unlike the
+    sign of det X they also tell when two turn over at once.
+    """
+    turned = np.linalg.solve(in_x, before @ np.linalg.inv(x))
+    return bool(np.linalg.eigvals(turned).real.min() <= 0.0)
+
+
+def concave_at(
+    extremals: Extremals, paths: Paths, schedule: Schedule, duration: float, below: float = 0.0
+) -> float | None:
+    """Return when H_uu, on the free controls, first has an eigenvalue not above ``below``.
+
+    None if it never does. Along a minimum no eigenvalue is negative (Legendre and Clebsch).
+    """
+    t, x, costate, u = extremals.trajectory(paths, schedule, duration)
+    p = np.vstack([schedule.p_left, schedule.p_last])
+    box, nu = extremals.ocp.control_bounds, u.shape[1]
+    curvature = extremals.optimality.hamiltonian.control_curvature.map(len(t))
+    hessians = np.array(curvature(x.T, u.T, costate.T, t[None, :], p.T)).T.reshape(-1, nu, nu)
+    free = (u > np.asarray(box.lower)) & (u < np.asarray(box.upper))
+    for k, (hessian, f) in enumerate(zip(hessians, free, strict=True)):
+        inner = (hessian + hessian.T)[np.ix_(f, f)] / 2.0
+        if inner.size and np.linalg.eigvalsh(inner)[0] <= below:
+            return float(t[k])
+    return None
+
+
+def _final_plane(
+    extremals: Extremals, paths: Paths, nu: np.ndarray, schedule: Schedule
+) -> np.ndarray:
+    """All (dx, dcostate) that meet the linearised end conditions for some multipliers."""
+    t = schedule.t0 + schedule.duration
+    _, in_z, in_nu, _ = (
+        np.array(a) for a in extremals.ends(paths.ends[-1], nu, t, schedule.p_last)
+    )
+    conditions = np.hstack([in_z, in_nu])
+    _, _, rows = np.linalg.svd(conditions)
+    return _orthonormal(rows[len(conditions) :, : in_z.shape[1]].T)
+
+
+def _orthonormal(plane: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the same plane."""
+    return np.linalg.qr(plane)[0]
+
+
+def _tangent_curvature(
+    extremals: Extremals, plane: np.ndarray, z0: np.ndarray, mu: np.ndarray, schedule: Schedule
+) -> SecondOrder:
+    """The cost-to-go must curve upwards along the start manifold."""
+    nx, m = extremals.shape.nx, extremals.shape.n_mu
+    riccati = plane[nx:] @ np.linalg.inv(plane[:nx])
+    _, in_z, _ = (np.array(a) for a in extremals.starts(z0, mu, schedule.t0, schedule.p_first))
+    normals, bending = in_z[:m, :nx], in_z[m:, :nx]
+    tangent = np.linalg.svd(normals)[2][m:].T
+    hessian = tangent.T @ (riccati + bending) @ tangent
+    if hessian.size and np.linalg.eigvalsh((hessian + hessian.T) / 2)[0] <= 0.0:
+        return SecondOrder(False, "the cost does not curve upwards along the start manifold")
+    return SecondOrder(True)

@@ -1,0 +1,1 @@
+"""Linear dynamics, quadratic cost: recursions and quadratic programs."""

@@ -1,0 +1,153 @@
+"""The batch approach: all inputs of a linear-quadratic problem from one linear system."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from ocp import (
+    OCP,
+    LinearQuadratic,
+    LQData,
+    Matrices,
+    Program,
+    Solution,
+    Solver,
+    Start,
+    Status,
+    Work,
+    linear_quadratic,
+)
+from solvers.linear import recursion
+from solvers.linear.stacked import Prediction
+
+# Above this condition number of H the inputs have fewer than about eight correct digits.
+_ILL_CONDITIONED = 1e8
+
+
+@dataclass(frozen=True)
+class Batch(Solver):
+    r"""Stack all states over all inputs, and set the gradient of the cost to zero.
+
+    .. math:: U^* = -H^{-1}(F'x_0 - k')
+
+    Source: thesis (2.4) to (2.21), with references, affine dynamics, cross terms and data that
+    change with time. Refuses bounds and constraints. The inputs that are stacked are those of
+    u = -Kx + v, with the gain of the infinite horizon: exact on unstable plants as well.
+
+    Args:
+        prestabilise: False: the thesis' plain form, K = 0. On an unstable plant H then loses
+            all digits with the length of the horizon; the answer is ``FAILED`` and says so.
+    """
+
+    prestabilise: bool = True
+
+    def build(self, ocp: OCP) -> "BatchProgram":
+        """Stack and factorise."""
+        lq = linear_quadratic(ocp)
+        recursion.refuse_constraints(lq, "Batch")
+        program = BatchProgram(self, lq)
+        if lq.fixed is not None:
+            _ = program.fixed
+        return program
+
+
+@dataclass(frozen=True, eq=False)
+class _Stacked:
+    """A prediction with its factorised Hessian; None where it is not positive definite."""
+
+    prediction: Prediction
+    factor: tuple[np.ndarray, bool] | None
+
+
+@dataclass(frozen=True, eq=False)
+class BatchProgram(Program):
+    """A stacked problem.
+
+    Attributes:
+        solver: the options.
+        lq: the problem as arrays.
+    """
+
+    solver: Batch
+    lq: LinearQuadratic
+
+    @property
+    def prediction(self) -> Prediction:
+        """The stacked matrices with the declared parameters."""
+        stacked = self.fixed or self._stack(self.lq.on(self.lq.declared).matrices)
+        return stacked.prediction
+
+    @cached_property
+    def fixed(self) -> _Stacked | None:
+        """The stacked matrices, where neither time nor parameters change them."""
+        return None if self.lq.fixed is None else self._stack(self.lq.fixed)
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve for these data; a guess is not needed."""
+        started = perf_counter()
+        data = self.lq.data(x0, t0, parameters)
+        numbers = self.lq.on(data)
+        stacked = self.fixed or self._stack(numbers.matrices)
+        x, u, status, message = self._solve(stacked, numbers, data.x0)
+        finite = status is not Status.DIVERGED
+        by_x, by_u = recursion.slopes(numbers, x, u)
+        final = 2.0 * (numbers.matrices.P @ x[-1] + numbers.p)
+        costate, h_u = recursion.adjoint(numbers, stacked.prediction.feedback, by_x, by_u, final)
+        finite = finite and bool(np.isfinite(costate).all())
+        ocp = self.lq.ocp
+        return Solution(
+            problem=ocp,
+            solver=repr(self.solver),
+            status=status,
+            message=message,
+            t=t0 + np.linspace(0.0, ocp.duration, self.lq.steps + 1),
+            x=x,
+            x0=data.x0,
+            costate=costate if finite else np.zeros_like(x),
+            u=u,
+            cost=recursion.cost(numbers, x, u) if finite else np.inf,
+            residual=float(np.abs(h_u).max()) if finite else np.inf,
+            iterations=1,
+            work=Work(rollouts=1, factorisations=1),
+            parameters=data.values.as_dict(),
+            solve_time=perf_counter() - started,
+        )
+
+    def _stack(self, matrices: Matrices) -> _Stacked:
+        steps, n, m = matrices.B.shape
+        feedback = np.zeros((steps, m, n))
+        if self.solver.prestabilise:
+            feedback = recursion.stabilising(matrices, self.lq.ocp.name)
+        prediction = Prediction.of(matrices, feedback)
+        try:
+            return _Stacked(prediction, cho_factor(prediction.hessian))
+        except (LinAlgError, ValueError):  # not positive definite, or not finite
+            return _Stacked(prediction, None)
+
+    def _solve(
+        self, stacked: _Stacked, data: LQData, x0: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, Status, str]:
+        prediction = stacked.prediction
+        with np.errstate(over="ignore", invalid="ignore"):
+            gradient = prediction.gradient(data, *prediction.nominal(data, x0))
+        advice = "" if self.solver.prestabilise else ": prestabilise"
+        said = f"H has the condition number {prediction.condition:.2g}{advice}"
+        if stacked.factor is None or not np.isfinite(gradient).all():
+            nothing = np.zeros((self.lq.steps, data.r.shape[1]))
+            return np.tile(x0, (len(nothing) + 1, 1)), nothing, Status.DIVERGED, said
+        x, u = prediction.trajectory(data, x0, -cho_solve(stacked.factor, gradient))
+        if prediction.condition > _ILL_CONDITIONED:
+            return x, u, Status.FAILED, said
+        return x, u, Status.SOLVED, ""

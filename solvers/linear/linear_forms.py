@@ -1,0 +1,271 @@
+"""A linear-quadratic problem as a quadratic program: sparse in (x, u), or condensed to inputs."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from ocp import LinearQuadratic, LQData, Matrices
+from solvers.linear import recursion
+from solvers.linear.stacked import Prediction
+
+# A point as (x (N + 1, n), u (N, m)).
+Trajectory = tuple[np.ndarray, np.ndarray]
+
+
+class Place(NamedTuple):
+    """What a row of the program says, for messages."""
+
+    name: str
+    node: int
+    is_control_bound: bool
+
+
+class Vectors(NamedTuple):
+    """What changes from run to run: g, and the bounds l and u of the rows."""
+
+    g: np.ndarray
+    l: np.ndarray  # noqa: E741
+    u: np.ndarray
+
+
+class Form(ABC):
+    """How unknowns and rows are laid out.
+
+    The rows of the constraints come last: those of node 0 that have a control, then of the
+    nodes 1 to N - 1, then of node N. Node 0 is measured, so nothing constrains its state.
+
+    Attributes:
+        lq: the problem.
+        equations: number of rows before them.
+        H: for the matrices last given.
+        G: for the matrices last given.
+    """
+
+    def __init__(self, lq: LinearQuadratic, equations: int) -> None:
+        """Name the rows."""
+        self.lq, self.equations = lq, equations
+        self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
+        stage = list(zip(lq.rows, lq.is_control_bound, strict=True))
+        first = [
+            Place(*row[:1], 0, row[1]) for row, on in zip(stage, lq.on_control, strict=True) if on
+        ]
+        later = [Place(name, k, bound) for k in range(1, lq.steps) for name, bound in stage]
+        last = [Place(name, lq.steps, False) for name in lq.end_rows]
+        self.places = (*first, *later, *last)
+
+    @abstractmethod
+    def set_matrices(self, matrices: Matrices) -> None:
+        """Fill H and G."""
+
+    @abstractmethod
+    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+        """Return g, l and u."""
+
+    @abstractmethod
+    def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
+        """Return states and controls of a point."""
+
+    @abstractmethod
+    def point(self, x: np.ndarray, u: np.ndarray, data: LQData) -> np.ndarray:
+        """Return the point of states and controls: a warm start."""
+
+    @abstractmethod
+    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the costates (N + 1, n); at an active bound the value just before the node."""
+
+    def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the multipliers of the stage rows (N, rows) and of the end rows."""
+        lq, own = self.lq, y[self.equations :]
+        on, count = lq.on_control, len(lq.rows)
+        stage = np.zeros((lq.steps, count))
+        first = int(on.sum())
+        stage[0, on] = own[:first]
+        middle = first + (lq.steps - 1) * count
+        stage[1:] = own[first:middle].reshape(lq.steps - 1, count)
+        return stage, own[middle:]
+
+    def _bounds(self, data: LQData) -> list[np.ndarray]:
+        """Return lower and upper bounds of the constraint rows."""
+        on = self.lq.on_control
+        return [
+            np.concatenate([stage[0, on], stage[1:].ravel(), end])
+            for stage, end in ((data.lower, data.lower_f), (data.upper, data.upper_f))
+        ]
+
+
+class Sparse(Form):
+    """Unknowns (u_0, x_1, u_1, ..., x_N): effort linear in the number of steps."""
+
+    def __init__(self, lq: LinearQuadratic) -> None:
+        """Lay out rows and columns once."""
+        n, m, steps = lq.ocp.model.nx, lq.ocp.model.nu, lq.steps
+        super().__init__(lq, steps * n)
+        start = np.arange(steps)[:, None] * (n + m)
+        self._u = start + np.arange(m)
+        self._after = start + m + np.arange(n)
+        self._hessian: _Pattern | None = None
+        self._rows: _Pattern | None = None
+
+    def set_matrices(self, matrices: Matrices) -> None:
+        """Fill the values in; where matrices change, zeros are kept so that the pattern stays."""
+        keep_zeros = self.lq.fixed is None
+        if self._hessian is None or self._rows is None:
+            self._hessian = _Pattern.of(self._hessian_blocks(matrices), self._size, keep_zeros)
+            self._rows = _Pattern.of(self._row_blocks(matrices), self._size, keep_zeros)
+        self.H = self._hessian.filled(self._hessian_blocks(matrices))
+        self.G = self._rows.filled(self._row_blocks(matrices))
+
+    @property
+    def _size(self) -> int:
+        return self._u.size + self._after.size
+
+    def _hessian_blocks(self, m: Matrices) -> list["_Block"]:
+        both = np.hstack([self._after[:-1], self._u[1:]])
+        last = self._after[-1:]
+        return [
+            _Block(self._u[:1], self._u[:1], 2.0 * m.R[:1]),
+            _Block(both, both, 2.0 * m.weights[1:]),
+            _Block(last, last, 2.0 * m.P[None]),
+        ]
+
+    def _row_blocks(self, m: Matrices) -> list["_Block"]:
+        steps, n = self._after.shape
+        on, count = self.lq.on_control, len(self.lq.rows)
+        gap = np.arange(steps * n).reshape(steps, n)
+        first = steps * n + np.arange(int(on.sum()))[None]
+        middle = first.size + steps * n + np.arange((steps - 1) * count).reshape(steps - 1, count)
+        end = steps * n + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
+        return [
+            _Block(gap, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
+            _Block(gap[1:], self._after[:-1], -m.A[1:]),
+            _Block(gap, self._u, -m.B),
+            _Block(first, self._u[:1], m.D_u[:1, on]),
+            _Block(middle, self._after[:-1], m.D_x[1:]),
+            _Block(middle, self._u[1:], m.D_u[1:]),
+            _Block(end, self._after[-1:], m.D_f[None]),
+        ]
+
+    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+        """Return g, l and u."""
+        m, on, first = data.matrices, self.lq.on_control, int(self.lq.on_control.sum())
+        g = np.empty(self._size)
+        g[self._u] = 2.0 * data.r
+        g[self._u[0]] += 2.0 * (x0 @ m.S[0])
+        g[self._after[:-1]] = 2.0 * data.q[1:]
+        g[self._after[-1]] = 2.0 * data.p
+        gap = data.c.copy()
+        gap[0] += m.A[0] @ x0
+        low, high = self._bounds(data)
+        known = m.D_x[0, on] @ x0
+        low[:first] -= known
+        high[:first] -= known
+        return Vectors(g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high]))
+
+    def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
+        """Return states and controls."""
+        return np.vstack([x0, z[self._after]]), z[self._u]
+
+    def point(self, x: np.ndarray, u: np.ndarray, data: LQData) -> np.ndarray:
+        """Return (u_0, x_1, u_1, ..., x_N)."""
+        z = np.empty(self._size)
+        z[self._u], z[self._after] = u, x[1:]
+        return z
+
+    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return minus the multipliers of x_{k+1} - A x_k - B u_k = c_k, and what follows at 0."""
+        m = data.matrices
+        later = -y[: self.equations].reshape(self._after.shape)
+        first = 2.0 * (m.Q[0] @ x[0] + m.S[0] @ u[0] + data.q[0])
+        first += m.A[0].T @ later[0] + m.D_x[0].T @ self.split(y)[0][0]
+        return np.vstack([first, later])
+
+
+class Condensed(Form):
+    """Unknowns V of u = -Kx + v (2.83 to 2.91): few and dense, for short horizons."""
+
+    def __init__(self, lq: LinearQuadratic) -> None:
+        """Wait for the matrices."""
+        super().__init__(lq, 0)
+        self._prediction: Prediction | None = None
+
+    def set_matrices(self, matrices: Matrices) -> None:
+        """Stack the matrices."""
+        feedback = recursion.stabilising(matrices, self.lq.ocp.name)
+        self._prediction = p = Prediction.of(matrices, feedback)
+        n, on = matrices.A.shape[1], self.lq.on_control
+        stage = matrices.D_x @ p.stages[:, :n] + matrices.D_u @ p.stages[:, n:]
+        width = p.end.shape[1]
+        rows = [stage[0, on], stage[1:].reshape(-1, width), matrices.D_f @ p.end]
+        self.H, self.G = sp.csc_matrix(p.hessian), sp.csc_matrix(np.vstack(rows))
+
+    @property
+    def _stacked(self) -> Prediction:
+        assert self._prediction is not None
+        return self._prediction
+
+    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+        """Return g, l and u."""
+        m, on = data.matrices, self.lq.on_control
+        z, x_end = self._stacked.nominal(data, x0)
+        n = len(x0)
+        rows = np.einsum("kij,kj->ki", m.D_x, z[:, :n]) + np.einsum("kij,kj->ki", m.D_u, z[:, n:])
+        known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
+        low, high = self._bounds(data)
+        return Vectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
+
+    def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
+        """Return states and controls."""
+        return self._stacked.trajectory(data, x0, z)
+
+    def point(self, x: np.ndarray, u: np.ndarray, data: LQData) -> np.ndarray:
+        """Return V = u + Kx."""
+        return (u + np.einsum("kij,kj->ki", self._stacked.feedback, x[:-1])).ravel()
+
+    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the adjoint of cost and constraints."""
+        m, (stage, end) = data.matrices, self.split(y)
+        by_x, by_u = recursion.slopes(data, x, u)
+        by_x = by_x + np.einsum("kij,ki->kj", m.D_x, stage)
+        by_u = by_u + np.einsum("kij,ki->kj", m.D_u, stage)
+        final = 2.0 * (m.P @ x[-1] + data.p) + m.D_f.T @ end
+        return recursion.adjoint(data, self._stacked.feedback, by_x, by_u, final)[0]
+
+
+class _Block(NamedTuple):
+    """K dense blocks: rows (K, a), columns (K, b), values (K, a, b)."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
+
+
+class _Pattern(NamedTuple):
+    """Where the values of blocks stand in a matrix that is sparse by columns."""
+
+    order: np.ndarray
+    rows: np.ndarray
+    starts: np.ndarray
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, blocks: list[_Block], width: int, keep_zeros: bool) -> "_Pattern":
+        """Sort the entries by columns."""
+        rows = np.concatenate(
+            [np.broadcast_to(b.rows[:, :, None], b.values.shape).ravel() for b in blocks]
+        )
+        columns = np.concatenate(
+            [np.broadcast_to(b.columns[:, None, :], b.values.shape).ravel() for b in blocks]
+        )
+        values = np.concatenate([b.values.ravel() for b in blocks])
+        kept = np.arange(len(values)) if keep_zeros else np.flatnonzero(values)
+        order = kept[np.lexsort((rows[kept], columns[kept]))]
+        height = 1 + max((int(b.rows.max()) for b in blocks if b.rows.size), default=-1)
+        starts = np.searchsorted(columns[order], np.arange(width + 1))
+        return cls(order, rows[order], starts, (height, width))
+
+    def filled(self, blocks: list[_Block]) -> sp.csc_matrix:
+        """Return the matrix with the values of blocks laid out alike."""
+        values = np.concatenate([b.values.ravel() for b in blocks])[self.order]
+        return sp.csc_matrix((values, self.rows, self.starts), shape=self.shape)

@@ -1,0 +1,259 @@
+"""Constrained linear optimal control: one quadratic program, solved again and again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import (
+    OCP,
+    Data,
+    LinearQuadratic,
+    LQData,
+    Matrices,
+    ProblemError,
+    Program,
+    Solution,
+    Solver,
+    Start,
+    Status,
+    Work,
+    linear_quadratic,
+)
+from solvers.linear import recursion
+from solvers.linear.elastic import least_violation
+from solvers.linear.linear_forms import Condensed, Form, Sparse
+from solvers.linear.qp_backends import Answer, Backend, qp_backend
+from solvers.linear.quadratic_program import QP, Residuals, Softening, residuals
+
+# A constraint that no point can meet better than this is infeasible, not inaccurate.
+_UNAVOIDABLE = 1e-7
+_NOTHING = Residuals(np.inf, np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class LinearMPC(Solver):
+    r"""A convex linear-quadratic problem with linear constraints, as a quadratic program.
+
+    .. math:: \min_z \; \frac12 z'Hz + g'z \quad \text{s.t.} \quad l \le Gz \le u
+
+    Source: thesis (2.82) to (2.91), with the slips mended: H is twice that of (2.8), and the
+    measured state x_0 is not constrained. What a receding-horizon controller calls: between
+    runs only the vectors change, the factorisation stays, the last answer is the warm start.
+    References are previewed: they are signals of the problem.
+
+    An answer is judged by the residuals computed here, not by the backend's word: ``SOLVED``
+    when primal, dual and gap residual are within the tolerance, all relative.
+
+    Stability needs a terminal cost from the algebraic Riccati equation
+    (``ocp.with_stationary_end``) and a horizon at whose end no constraint is active
+    [Mayne et al. 2000]; or simply a horizon that is long.
+
+    Args:
+        backend: ``"osqp"`` [Stellato et al. 2020], or any backend of qpsolvers by its name.
+        form: ``"sparse"`` keeps the states as unknowns, effort linear in the horizon;
+            ``"condensed"`` has inputs only (2.83), pre-stabilised: good for short horizons.
+        tolerance: largest accepted residual.
+        soft: price of exceeding a constraint that is not a bound of a control, an exact
+            penalty; it has to exceed the constraints' multipliers. None: hard.
+    """
+
+    backend: str = "osqp"
+    form: Literal["sparse", "condensed"] = "sparse"
+    tolerance: float = 1e-8
+    soft: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        if self.form not in _FORMS:
+            raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
+        if not 0.0 < self.tolerance < 1.0:
+            raise ProblemError(f"LinearMPC: tolerance = {self.tolerance}, it must be in (0, 1)")
+        if self.soft is not None and not 0.0 < self.soft < np.inf:
+            raise ProblemError(f"LinearMPC: soft = {self.soft}, the price must be positive")
+
+    def build(self, ocp: OCP) -> "LinearMPCProgram":
+        """Read the matrices, lay the program out."""
+        lq = linear_quadratic(ocp)
+        form = _FORMS[self.form](lq)
+        softening = None
+        if self.soft is not None:
+            rows = [form.equations + i for i, p in enumerate(form.places) if not p.is_control_bound]
+            softening = Softening(np.array(rows, dtype=int), self.soft)
+        program = LinearMPCProgram(
+            self, lq, form, qp_backend(self.backend, self.tolerance), softening
+        )
+        program.prepare(lq.sample_matrices(lq.declared) if lq.fixed is None else lq.fixed)
+        return program
+
+
+_FORMS: dict[str, type[Sparse] | type[Condensed]] = {"sparse": Sparse, "condensed": Condensed}
+
+
+@dataclass(eq=False)
+class _Workspace:
+    """What the last run left: its matrices, and the program with them."""
+
+    matrices: Matrices | None = None
+    hard: QP | None = None
+    soft: QP | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMPCProgram(Program):
+    """A quadratic program with its backend; one run at a time.
+
+    Attributes:
+        solver: the options.
+        lq: the problem as arrays.
+        form: layout of unknowns and rows.
+        backend: who solves it, with its workspace.
+        softening: which rows are soft.
+    """
+
+    solver: LinearMPC
+    lq: LinearQuadratic
+    form: Form
+    backend: Backend
+    softening: Softening | None
+    _workspace: _Workspace = field(default_factory=_Workspace)
+
+    def prepare(self, matrices: Matrices) -> None:
+        """Take other matrices; nothing happens if they are the last ones."""
+        w = self._workspace
+        if matrices is w.matrices:
+            return
+        self.form.set_matrices(matrices)
+        nothing = np.empty(0)
+        w.matrices, w.hard = matrices, QP(self.form.H, self.form.G, nothing, nothing, nothing)
+        w.soft = w.hard
+        if self.softening:
+            h, g = self.softening.soften(self.form.H, self.form.G)
+            w.soft = QP(h, g, nothing, nothing, nothing)
+
+    def quadratic_program(self, data: Data) -> QP:
+        """Return the (soft) program of a run, for who wants to solve it elsewhere."""
+        return self._programs(data, self.lq.on(data))[1]
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve for these data, from the last answer unless there is a guess."""
+        started = perf_counter()
+        data = self.lq.data(x0, t0, parameters)
+        numbers = self.lq.on(data)
+        hard, qp = self._programs(data, numbers)
+        answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
+        found = _NOTHING
+        if answer.z is not None and answer.y is not None:
+            found = residuals(qp, answer.z, answer.y)
+        z, y, status, message = self._verdict(answer, found, hard, qp)
+        x, u = self.form.trajectory(z, numbers, data.x0)
+        costate = self.form.costates(y, numbers, x, u)
+        sound = all(np.isfinite(a).all() for a in (x, u, costate))
+        if not sound:
+            x, u = np.tile(data.x0, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
+            costate, status = np.zeros_like(x), Status.DIVERGED
+        return Solution(
+            problem=self.lq.ocp,
+            solver=repr(self.solver),
+            status=status,
+            message=message,
+            t=t0 + self._clock,
+            x=x,
+            x0=data.x0,
+            costate=costate,
+            u=u,
+            cost=recursion.cost(numbers, x, u) if sound else np.inf,
+            residual=max(found),
+            iterations=answer.iterations,
+            work=Work(rollouts=1, factorisations=answer.factorisations),
+            history={
+                "primal": np.array([found.primal]),
+                "dual": np.array([found.dual]),
+                "gap": np.array([found.gap]),
+                "multipliers": y[self.form.equations :],
+            },
+            parameters=data.values.as_dict(),
+            solve_time=perf_counter() - started,
+        )
+
+    # -- pieces -----------------------------------------------------------------------------
+
+    @cached_property
+    def _clock(self) -> np.ndarray:
+        return np.linspace(0.0, self.lq.ocp.duration, self.lq.steps + 1)
+
+    def _programs(self, data: Data, numbers: LQData) -> tuple[QP, QP]:
+        """Return the program with hard constraints, and the one to solve."""
+        self.prepare(numbers.matrices)
+        w = self._workspace
+        assert w.hard is not None
+        assert w.soft is not None
+        vectors = self.form.vectors(numbers, data.x0)
+        hard = QP(w.hard.H, w.hard.G, *vectors)
+        if self.softening is None:
+            return hard, hard
+        return hard, QP(w.soft.H, w.soft.G, *self.softening.bounds(*vectors))
+
+    def _warm_start(self, guess: Start | None, numbers: LQData, qp: QP) -> np.ndarray | None:
+        if guess is None:
+            return None
+        nodes, model = np.linspace(0.0, 1.0, self.lq.steps + 1), self.lq.ocp.model
+        x = guess.sample("x", nodes, model.nx)
+        u = guess.sample("u", nodes[:-1], model.nu)
+        if x is None or u is None:
+            return None
+        z = self.form.point(x, u, numbers)
+        return np.concatenate([z, np.zeros(len(qp.g) - len(z))])
+
+    def _verdict(
+        self, answer: Answer, found: Residuals, hard: QP, qp: QP
+    ) -> tuple[np.ndarray, np.ndarray, Status, str]:
+        """Return point, multipliers, status and message."""
+        size, rows = len(hard.g), len(hard.l)
+        if answer.z is not None and answer.y is not None and max(found) <= self.solver.tolerance:
+            y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
+            return answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:])
+        elastic = self._elastic_rows()
+        point, excess = least_violation(qp if self.softening else hard, elastic, rows)
+        if excess.max(initial=0.0) > _UNAVOIDABLE:
+            worst = int(excess.argmax())
+            said = f"{self._where(worst)} cannot be met, it is exceeded by {excess[worst]:.3g}"
+            return point[:size], np.zeros(rows), Status.INFEASIBLE, said
+        said = (
+            f"{self.solver.backend} says '{answer.word}'; residuals: primal {found.primal:.2g}, "
+            f"dual {found.dual:.2g}, gap {found.gap:.2g}"
+        )
+        if answer.z is None or answer.y is None:
+            return point[:size], np.zeros(rows), Status.FAILED, said
+        y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
+        return answer.z[:size], y, Status.ITERATION_LIMIT, said
+
+    def _elastic_rows(self) -> np.ndarray:
+        """Rows that give way in the search for the cause: all but dynamics and control bounds."""
+        rows = [self.form.equations + i for i, p in enumerate(self.form.places)
+                if not p.is_control_bound]  # fmt: skip
+        return np.array(rows, dtype=int)
+
+    def _where(self, row: int) -> str:
+        place = self.form.places[row - self.form.equations]
+        dt = self.lq.ocp.model.dt or 0.0
+        return f"'{place.name}' at step {place.node} (t0 + {place.node * dt:.4g} s)"
+
+    def _exceeded(self, slack: np.ndarray) -> str:
+        """Say which soft constraint is exceeded most."""
+        if self.softening is None or slack.max(initial=0.0) <= self.solver.tolerance:
+            return ""
+        worst = int(slack.argmax())
+        where = self._where(int(self.softening.rows[worst]))
+        return f"soft constraint {where} is exceeded by {slack[worst]:.3g}"

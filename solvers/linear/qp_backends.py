@@ -1,0 +1,209 @@
+"""Who solves a quadratic program: OSQP, kept factorised, or any backend of qpsolvers."""
+
+import pkgutil
+import warnings
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
+
+import numpy as np
+import osqp
+import qpsolvers
+import qpsolvers.solvers
+import scipy.sparse as sp
+from qpsolvers.exceptions import QPError
+
+from ocp import ProblemError
+from solvers.linear.active_set import ActiveSet
+from solvers.linear.quadratic_program import QP
+
+# A backend measures its residuals in its own way; it is asked for this much more.
+_MARGIN = 0.1
+# What goes wrong inside a backend is its failure, never a sign that it is not installed.
+_INSIDE = (QPError, ArithmeticError, LookupError, RuntimeError, ValueError, TypeError)
+
+
+class Answer(NamedTuple):
+    """What a backend returned.
+
+    Attributes:
+        z: (n,), or None.
+        y: multipliers of the rows (rows,), or None.
+        word: what it says about it.
+        iterations: as far as it says.
+        factorisations: the same.
+    """
+
+    z: np.ndarray | None
+    y: np.ndarray | None
+    word: str
+    iterations: int = 0
+    factorisations: int = 1
+
+
+class Backend(ABC):
+    """Solves programs whose matrices seldom change."""
+
+    @abstractmethod
+    def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
+        """Solve a program; the same matrix objects as last time are taken as unchanged."""
+
+
+class OSQPBackend(Backend):
+    """OSQP [Stellato et al. 2020], set up once and warm started from its last answer.
+
+    It finds the active rows to a loose tolerance, ``ActiveSet`` makes the answer exact; only
+    where that fails it goes on, with the same factorisation, to tighter ones. Its own polishing
+    is off: it does not correct a wrong guess of the active rows, and it prints.
+    """
+
+    _LADDER = (1e-3, 1e-5, 1e-7, 1e-9)
+
+    def __init__(self, tolerance: float) -> None:
+        """Set nothing up yet."""
+        self._tolerance = tolerance
+        self._solver: osqp.OSQP | None = None
+        self._refiner: ActiveSet | None = None
+        self._h: sp.csc_matrix | None = None
+        self._g: sp.csc_matrix | None = None
+
+    def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
+        """Update what changed, and solve."""
+        factorisations = self._prepare(qp)
+        solver, refiner = self._solver, self._refiner
+        assert solver is not None
+        assert refiner is not None
+        if start is not None:
+            solver.warm_start(x=start)
+        iterations, word, best = 0, "", None
+        for eps in self._LADDER:
+            solver.update_settings(eps_abs=eps, eps_rel=eps)
+            result = solver.solve(raise_error=False)
+            iterations, word = iterations + int(result.info.iter), str(result.info.status)
+            if "infeasible" in word or not np.isfinite(result.x).all():
+                break
+            found = refiner.refine(qp, result.x, result.y, self._tolerance)
+            factorisations += found.factorisations
+            if best is None or found.residual < best.residual:
+                best = found
+            if best.residual <= self._tolerance:
+                solver.warm_start(x=best.z, y=best.y)
+                break
+        if best is None:
+            self._solver = None  # the iterates of an infeasible program are a bad warm start
+            return Answer(None, None, word, iterations, factorisations)
+        return Answer(best.z, best.y, word, iterations, factorisations)
+
+    def _prepare(self, qp: QP) -> int:
+        """Bring the workspace up to date; return how often it factorised."""
+        if self._solver is not None and qp.H is self._h and qp.G is self._g:
+            self._solver.update(q=qp.g, l=qp.l, u=qp.u)
+            return 0
+        upper = sp.csc_matrix(sp.triu(qp.H, format="csc"))
+        same = _same_pattern(qp.H, self._h) and _same_pattern(qp.G, self._g)
+        if self._solver is not None and same:
+            self._solver.update(q=qp.g, l=qp.l, u=qp.u)
+            self._solver.update(Px=upper.data, Ax=qp.G.data)
+        else:
+            self._solver = osqp.OSQP()
+            rows = (qp.G, qp.l, qp.u)
+            self._solver.setup(upper, qp.g, *rows, verbose=False, **_OSQP)
+        self._h, self._g, self._refiner = qp.H, qp.G, ActiveSet(qp.H, qp.G)
+        return 1
+
+
+class NamedBackend(Backend):
+    """Any backend of qpsolvers, by its name there."""
+
+    def __init__(self, name: str, tolerance: float) -> None:
+        """Keep name and tolerance."""
+        self._name = name
+        tight = _MARGIN * tolerance
+        self._options = dict.fromkeys(_TOLERANCES.get(name, ()), tight) | _MORE.get(name, {})
+        self._sparse = name in qpsolvers.sparse_solvers
+
+    def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
+        """Solve from scratch."""
+        equal = qp.l == qp.u
+        above, below = np.isfinite(qp.u) & ~equal, np.isfinite(qp.l) & ~equal
+        rows = qp.G.tocsr()
+        shape = (lambda a: sp.csc_matrix(a)) if self._sparse else (lambda a: a.toarray())
+        inequalities: tuple[Any, Any] = (None, None)
+        if above.any() or below.any():
+            g = sp.vstack([rows[above], -rows[below]])
+            inequalities = (shape(g), np.concatenate([qp.u[above], -qp.l[below]]))
+        equations = (shape(rows[equal]), qp.u[equal]) if equal.any() else (None, None)
+        problem = qpsolvers.Problem(shape(qp.H), qp.g, *inequalities, *equations)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                function = qpsolvers.solvers.solve_function[self._name]
+                found = function(problem, verbose=False, **self._options)
+        except _INSIDE as error:
+            return Answer(None, None, f"{type(error).__name__} inside the backend: {error}")
+        if found.x is None or not np.isfinite(found.x).all():
+            return Answer(None, None, "no solution found")
+        y = np.zeros(len(qp.l))
+        if found.z is not None and len(found.z):
+            y[above] += found.z[: above.sum()]
+            y[below] -= found.z[above.sum() :]
+        if found.y is not None and len(found.y):
+            y[equal] = found.y
+        word = "solved" if found.found else "no solution found"
+        return Answer(np.asarray(found.x), y, word)
+
+
+def qp_backend(name: str, tolerance: float) -> Backend:
+    """Return a backend by its name.
+
+    Raises:
+        ProblemError: if nobody knows the name, or with what to type if it is not installed.
+    """
+    known = known_backends()
+    if name not in known:
+        raise ProblemError(f"QP backend {name!r} is not one of {', '.join(known)}")
+    if name == "osqp":
+        return OSQPBackend(tolerance)
+    if name not in qpsolvers.available_solvers:
+        raise ProblemError(
+            f"QP backend {name!r} is not installed: pip install {_PACKAGES.get(name, name)} "
+            f"(installed are {', '.join(sorted(qpsolvers.available_solvers))})"
+        )
+    return NamedBackend(name, tolerance)
+
+
+def known_backends() -> tuple[str, ...]:
+    """Return the names of all backends that qpsolvers has an interface for."""
+    modules = pkgutil.iter_modules(qpsolvers.solvers.__path__)
+    return tuple(sorted(m.name[:-1] for m in modules if m.name.endswith("_")))
+
+
+def _same_pattern(a: sp.csc_matrix, b: sp.csc_matrix | None) -> bool:
+    return (
+        b is not None
+        and np.array_equal(a.indptr, b.indptr)
+        and np.array_equal(a.indices, b.indices)
+    )
+
+
+# Where the name of the package is another one.
+_PACKAGES = {"highs": "highspy", "proxqp": "proxsuite", "gurobi": "gurobipy"}
+# What each backend calls its tolerances.
+_TOLERANCES = {
+    "clarabel": ("tol_gap_abs", "tol_gap_rel", "tol_feas"),
+    "daqp": ("primal_tol", "dual_tol"),
+    "ecos": ("feastol", "abstol", "reltol"),
+    "highs": ("primal_feasibility_tolerance", "dual_feasibility_tolerance"),
+    "piqp": ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel"),
+    "proxqp": ("eps_abs", "eps_rel"),
+    "scs": ("eps_abs", "eps_rel"),
+}
+_MORE: dict[str, dict[str, Any]] = {
+    "scs": {"max_iters": 100000},
+}
+# Infeasibility is decided late, and the answer refined elsewhere.
+_OSQP: dict[str, Any] = {
+    "max_iter": 20000,
+    "check_termination": 10,
+    "eps_prim_inf": 1e-7,
+    "eps_dual_inf": 1e-7,
+}

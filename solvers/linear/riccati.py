@@ -1,0 +1,131 @@
+"""Dynamic programming for linear-quadratic problems: Riccati's recursion."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import (
+    OCP,
+    Data,
+    LinearQuadratic,
+    ProblemError,
+    Program,
+    Solution,
+    Solver,
+    Start,
+    Status,
+    Work,
+    linear_quadratic,
+    with_stationary_end,
+)
+from solvers.linear import recursion
+
+
+@dataclass(frozen=True)
+class Riccati(Solver):
+    r"""Riccati's recursion: feedback gains and costs-to-go of a linear-quadratic problem.
+
+    .. math:: u_k = -K_kx_k - k_k, \qquad J_k^*(x) = x'P_kx + 2p_k'x + \text{const}, \qquad
+              \lambda_k = 2(P_kx_k + p_k)
+
+    Source: thesis (2.47), (2.48), with references, affine dynamics, cross terms and data that
+    change with time. Effort linear in the number of steps. Refuses bounds and constraints.
+
+    Args:
+        horizon: ``"finite"``: the problem as it stands; ``"infinite"``: its terminal cost is
+            replaced by the cost of going on for ever (``with_stationary_end``), so that every
+            gain is the stationary one.
+    """
+
+    horizon: Literal["finite", "infinite"] = "finite"
+
+    def __post_init__(self) -> None:
+        """Check the option."""
+        if self.horizon not in ("finite", "infinite"):
+            raise ProblemError(
+                f"Riccati: horizon = {self.horizon!r} is neither finite nor infinite"
+            )
+
+    def build(self, ocp: OCP) -> "RiccatiProgram":
+        """Read the matrices; where they are constant, do the recursion."""
+        problem = with_stationary_end(ocp) if self.horizon == "infinite" else ocp
+        lq = linear_quadratic(problem)
+        recursion.refuse_constraints(lq, "Riccati")
+        program = RiccatiProgram(self, lq)
+        if lq.fixed is not None:
+            _ = program.fixed_gains
+        return program
+
+
+@dataclass(frozen=True, eq=False)
+class RiccatiProgram(Program):
+    """A problem whose gains are known.
+
+    Attributes:
+        solver: the options.
+        lq: the problem as arrays.
+    """
+
+    solver: Riccati
+    lq: LinearQuadratic
+
+    @property
+    def P(self) -> np.ndarray:
+        """Costs-to-go P_k with the declared parameters, (N + 1, n, n)."""
+        return self._declared.P
+
+    @property
+    def K(self) -> np.ndarray:
+        """Gains K_k with the declared parameters, (N, m, n)."""
+        return self._declared.K
+
+    @cached_property
+    def k(self) -> np.ndarray:
+        """Feed-forward k_k of u = -K x - k with the declared parameters, (N, m)."""
+        return recursion.affine_parts(self._declared, self.lq.on(self.lq.declared))[1]
+
+    @cached_property
+    def fixed_gains(self) -> recursion.Gains | None:
+        """The gains, where neither time nor parameters change them."""
+        return None if self.lq.fixed is None else recursion.gains(self.lq.fixed)
+
+    @cached_property
+    def _declared(self) -> recursion.Gains:
+        return self.fixed_gains or recursion.gains(self.lq.on(self.lq.declared).matrices)
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve for these data; a guess is not needed."""
+        started = perf_counter()
+        data: Data = self.lq.data(x0, t0, parameters)
+        numbers = self.lq.on(data)
+        gains = self.fixed_gains or recursion.gains(numbers.matrices)
+        p, k = recursion.affine_parts(gains, numbers)
+        x, u = recursion.roll(numbers, data.x0, gains.K, -k)
+        ocp = self.lq.ocp
+        return Solution(
+            problem=ocp,
+            solver=repr(self.solver),
+            status=Status.SOLVED,
+            t=t0 + np.linspace(0.0, ocp.duration, self.lq.steps + 1),
+            x=x,
+            x0=data.x0,
+            costate=2.0 * (np.einsum("kij,kj->ki", gains.P, x) + p),
+            u=u,
+            cost=recursion.cost(numbers, x, u),
+            iterations=1,
+            work=Work(rollouts=1, factorisations=self.lq.steps),
+            parameters=data.values.as_dict(),
+            solve_time=perf_counter() - started,
+        )

@@ -1,0 +1,80 @@
+"""All states and controls as linear functions of the inputs: the stacked form (2.4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ocp import LQData, Matrices
+from solvers.linear.recursion import roll
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    r"""States and controls under u = -Kx + v, stacked.
+
+    .. math:: \begin{pmatrix} x_k \\ u_k \end{pmatrix} = Z_k V + \text{nominal}, \qquad
+              x_N = Z_N V + \text{nominal}
+
+    With K = 0 this is (2.4); with a stabilising K no power of an unstable A appears, and the
+    Hessian stays well conditioned whatever plant and horizon [Rossiter et al. 1998].
+
+    Attributes:
+        feedback: K (N, m, n).
+        stages: Z_k (N, n + m, N m).
+        end: Z_N (n, N m).
+        hessian: of the cost in V, (N m, N m): 2 H of (2.8).
+        condition: condition number of the Hessian.
+    """
+
+    feedback: np.ndarray
+    stages: np.ndarray
+    end: np.ndarray
+    hessian: np.ndarray
+    condition: float
+
+    @classmethod
+    def of(cls, matrices: Matrices, feedback: np.ndarray) -> "Prediction":
+        """Stack the matrices."""
+        steps, n, m = matrices.B.shape
+        closed = matrices.A - matrices.B @ feedback
+        z, x = np.zeros((steps, n + m, steps * m)), np.zeros((n, steps * m))
+        for k in range(steps):
+            own = slice(k * m, (k + 1) * m)
+            z[k, :n] = x
+            z[k, n:] = -feedback[k] @ x
+            z[k, n:, own] = np.eye(m)
+            x = closed[k] @ x
+            x[:, own] = matrices.B[k]
+        flat = z.reshape(-1, steps * m)
+        weighted = (matrices.weights @ z).reshape(-1, steps * m)
+        hessian = 2.0 * (flat.T @ weighted + x.T @ matrices.P @ x)
+        hessian = (hessian + hessian.T) / 2
+        return cls(feedback, z, x, hessian, _condition(hessian))
+
+    def nominal(self, data: LQData, x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (x, u) at nodes 0..N-1 with V = 0, (N, n + m), and x_N."""
+        steps, m = self.feedback.shape[:2]
+        x, u = roll(data, x0, self.feedback, np.zeros((steps, m)))
+        return np.hstack([x[:-1], u]), x[-1]
+
+    def gradient(self, data: LQData, z: np.ndarray, x_end: np.ndarray) -> np.ndarray:
+        """Return the gradient of the cost in V at V = 0, from the nominal trajectory."""
+        slope = np.einsum("kij,kj->ki", data.matrices.weights, z)
+        slope += np.hstack([data.q, data.r])
+        final = data.matrices.P @ x_end + data.p
+        flat = self.stages.reshape(-1, self.stages.shape[2])
+        return 2.0 * (slope.ravel() @ flat + final @ self.end)
+
+    def trajectory(
+        self, data: LQData, x0: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return states (N + 1, n) and controls (N, m) of inputs V (N m,)."""
+        return roll(data, x0, self.feedback, v.reshape(self.feedback.shape[:2]))
+
+
+def _condition(hessian: np.ndarray) -> float:
+    """Ratio of the extreme eigenvalues; infinite where one is not positive."""
+    if not np.isfinite(hessian).all():
+        return np.inf
+    values = np.linalg.eigvalsh(hessian)
+    return float(values[-1] / values[0]) if values[0] > 0.0 else np.inf

@@ -1,0 +1,1 @@
+"""Generalised predictive control of CARIMA models."""
