@@ -9,7 +9,7 @@ from solvers.indirect.second_order import SecondOrder, second_order
 from solvers.linear.batch import Batch
 from solvers.linear.linear_mpc import LinearMPC
 from solvers.linear.riccati import Riccati
-from solvers.multistart import LocalOptimum, multistart
+from solvers.multistart import LocalOptimum, multistart, random_guesses
 from solvers.polish import polish
 from solvers.predictive.gpc import GPC, GPCLaw
 from solvers.predictive.gpc_loop import GPCRun, gpc_loop
@@ -42,5 +42,6 @@ __all__ = [
     "gpc_loop",
     "multistart",
     "polish",
+    "random_guesses",
     "second_order",
 ]

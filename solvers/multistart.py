@@ -39,8 +39,7 @@ def multistart(
 ) -> tuple[LocalOptimum, ...]:
     """Solve from several starts and return the distinct local optima, best first.
 
-    The first start is the problem's own; the others are smooth random controls (a constant
-    and half a cosine wave per control, with normal amplitudes), within their bounds.
+    The first start is the problem's own; the others are ``random_guesses``.
 
     Args:
         ocp: the problem; built once.
@@ -65,7 +64,7 @@ def multistart(
     started = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - started
-    guesses = [None, *_random_guesses(ocp, starts - 1, seed, amplitude)]
+    guesses = [None, *random_guesses(ocp, starts - 1, seed, amplitude)]
     found: list[LocalOptimum] = []
     for guess in guesses:
         solution = program.run(guess=guess).with_(build_time=build_time)
@@ -77,7 +76,16 @@ def multistart(
     return tuple(sorted(found, key=lambda optimum: optimum.cost))
 
 
-def _random_guesses(ocp: OCP, number: int, seed: int, amplitude: float) -> list[Guess]:
+def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> list[Guess]:
+    """Return smooth random controls: a constant and half a cosine wave for each control.
+
+    Args:
+        ocp: the problem.
+        number: how many.
+        seed: the same seed gives the same guesses.
+        amplitude: standard deviation of both parts, in the controls' own units (where a
+            control is bounded, at most half its range).
+    """
     rng = np.random.default_rng(seed)
     box, nu = ocp.control_bounds, ocp.model.nu
     with np.errstate(invalid="ignore"):

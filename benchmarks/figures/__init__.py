@@ -1,4 +1,4 @@
-"""The figures of chapter 2 of the thesis, each drawn from results computed for it."""
+"""The figures of the thesis, each drawn from results computed for it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,8 @@ from pathlib import Path
 
 from benchmarks.figures import (
     constrained,
+    descent,
+    descent_gap,
     dynamic_programming,
     free_and_forced,
     horizon_map,
@@ -48,6 +50,11 @@ FIGURES = (
     Figure("2.12", "approaching the constraint", constrained.approach),
     Figure("2.13", "a smaller interval", interval.smaller_steps),
     Figure("2.14", "horizon and interval", horizon_map.horizon_and_interval),
+    Figure("3.12", "convergence of Schuetz' method", descent.convergence),
+    Figure("3.13", "its climb, with the tests off", descent.climb),
+    Figure("3.13a", "what makes it climb", descent.causes),
+    Figure("3.13b", "its gap over the step length", descent_gap.over_step),
+    Figure("3.13c", "its gap over the start", descent_gap.over_start),
 )
 
 
