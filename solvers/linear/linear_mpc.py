@@ -28,11 +28,10 @@ from solvers.linear import recursion
 from solvers.linear.elastic import least_violation
 from solvers.linear.linear_forms import Condensed, Form, Sparse
 from solvers.linear.qp_backends import Answer, Backend, qp_backend
-from solvers.linear.quadratic_program import QP, Residuals, Softening, residuals
+from solvers.linear.quadratic_program import QP, Softening
 
 # A constraint that no point can meet better than this is infeasible, not inaccurate.
 _UNAVOIDABLE = 1e-7
-_NOTHING = Residuals(np.inf, np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -128,12 +127,10 @@ class LinearMPCProgram(Program):
         if matrices is w.matrices:
             return
         self.form.set_matrices(matrices)
-        nothing = np.empty(0)
-        w.matrices, w.hard = matrices, QP(self.form.H, self.form.G, nothing, nothing, nothing)
+        w.matrices, w.hard = matrices, QP.of(self.form.H, self.form.G)
         w.soft = w.hard
         if self.softening:
-            h, g = self.softening.soften(self.form.H, self.form.G)
-            w.soft = QP(h, g, nothing, nothing, nothing)
+            w.soft = QP.of(*self.softening.soften(self.form.H, self.form.G))
 
     def quadratic_program(self, data: Data) -> QP:
         """Return the (soft) program of a run, for who wants to solve it elsewhere."""
@@ -153,10 +150,8 @@ class LinearMPCProgram(Program):
         numbers = self.lq.on(data)
         hard, qp = self._programs(data, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
-        found = _NOTHING
-        if answer.z is not None and answer.y is not None:
-            found = residuals(qp, answer.z, answer.y)
-        z, y, status, message = self._verdict(answer, found, hard, qp)
+        found = answer.residuals
+        z, y, status, message = self._verdict(answer, hard, qp)
         x, u = self.form.trajectory(z, numbers, data.x0)
         costate = self.form.costates(y, numbers, x, u)
         sound = all(np.isfinite(a).all() for a in (x, u, costate))
@@ -200,10 +195,10 @@ class LinearMPCProgram(Program):
         assert w.hard is not None
         assert w.soft is not None
         vectors = self.form.vectors(numbers, data.x0)
-        hard = QP(w.hard.H, w.hard.G, *vectors)
+        hard = w.hard.with_vectors(*vectors)
         if self.softening is None:
             return hard, hard
-        return hard, QP(w.soft.H, w.soft.G, *self.softening.bounds(*vectors))
+        return hard, w.soft.with_vectors(*self.softening.bounds(*vectors))
 
     def _warm_start(self, guess: Start | None, numbers: LQData, qp: QP) -> np.ndarray | None:
         if guess is None:
@@ -217,10 +212,10 @@ class LinearMPCProgram(Program):
         return np.concatenate([z, np.zeros(len(qp.g) - len(z))])
 
     def _verdict(
-        self, answer: Answer, found: Residuals, hard: QP, qp: QP
+        self, answer: Answer, hard: QP, qp: QP
     ) -> tuple[np.ndarray, np.ndarray, Status, str]:
         """Return point, multipliers, status and message."""
-        size, rows = len(hard.g), len(hard.l)
+        size, rows, found = len(hard.g), len(hard.l), answer.residuals
         if answer.z is not None and answer.y is not None and max(found) <= self.solver.tolerance:
             y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
             return answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:])
