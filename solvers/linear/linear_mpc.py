@@ -153,22 +153,23 @@ class LinearMPCProgram(Program):
         found = answer.residuals
         z, y, status, message = self._verdict(answer, hard, qp)
         x, u = self.form.trajectory(z, numbers, data.x0)
-        costate = self.form.costates(y, numbers, x, u)
+        half = recursion.half_slopes(numbers, x, u)
+        costate = self.form.costates(y, numbers, x[-1], half)
         sound = all(np.isfinite(a).all() for a in (x, u, costate))
         if not sound:
             x, u = np.tile(data.x0, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
             costate, status = np.zeros_like(x), Status.DIVERGED
         return Solution(
             problem=self.lq.ocp,
-            solver=repr(self.solver),
+            solver=self._name,
             status=status,
             message=message,
-            t=t0 + self._clock,
+            t=t0 + self.lq.nodes,
             x=x,
             x0=data.x0,
             costate=costate,
             u=u,
-            cost=recursion.cost(numbers, x, u) if sound else np.inf,
+            cost=recursion.cost(numbers, x, u, half) if sound else np.inf,
             residual=max(found),
             iterations=answer.iterations,
             work=Work(rollouts=1, factorisations=answer.factorisations),
@@ -185,8 +186,8 @@ class LinearMPCProgram(Program):
     # -- pieces -----------------------------------------------------------------------------
 
     @cached_property
-    def _clock(self) -> np.ndarray:
-        return np.linspace(0.0, self.lq.ocp.duration, self.lq.steps + 1)
+    def _name(self) -> str:
+        return repr(self.solver)
 
     def _programs(self, data: Data, numbers: LQData) -> tuple[QP, QP]:
         """Return the program with hard constraints, and the one to solve."""
