@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -108,9 +108,9 @@ def median_time(step: Callable[[Situation], object], seen: Sequence[Situation]) 
     step(seen[0])
     taken = []
     for now in seen:
-        started = perf_counter()
+        started = process_time()
         step(now)
-        taken.append(perf_counter() - started)
+        taken.append(process_time() - started)
     return float(np.median(taken))
 
 
@@ -157,10 +157,10 @@ def _steps(mass: OCP, free: OCP) -> dict[str, Callable[[Situation], object]]:
 def feedback_law_time(steps: int, count: int = 1000) -> float:
     """Return the time of applying Riccati's first gain, u = -K x [s]: a step of DP (2.1.4)."""
     gain, x = Riccati().build(unconstrained(steps)).K[0], np.ones(3)
-    started = perf_counter()
+    started = process_time()
     for _ in range(count):
         _ = -gain @ x
-    return (perf_counter() - started) / count
+    return (process_time() - started) / count
 
 
 def peer_pairs(backends: Sequence[str], count: int = 80) -> list[Pair] | None:
@@ -185,11 +185,11 @@ def _pair(
     program = LinearMPC(backend=backend, form=form).build(mass_tracking(PEER_HORIZON))
     ours, theirs, apart = [], [], []
     for now in (seen[0], *seen):
-        began = perf_counter()
+        began = process_time()
         plan = program.run(x0=now.x, t0=now.t, parameters={"reference": now.ahead})
-        between = perf_counter()
+        between = process_time()
         first = peer(now)
-        theirs.append(perf_counter() - between)
+        theirs.append(process_time() - between)
         ours.append(between - began)
         apart.append(abs(float(plan.or_raise().u[0, 0]) - first))
     mine, other = np.array(ours[1:]), np.array(theirs[1:])

@@ -11,6 +11,8 @@ from solvers.linear.quadratic_program import QP, Residuals, residuals
 _BLOCK_STEPS = 8
 # Relative to what has to cancel, violations and multipliers below this are rounding.
 _ROUNDING = 1e-12
+# What has residuals like these is not compared with the guess.
+_EXACT = 1e-10
 # A row is dependent on the met ones if less than this part of its curvature is left.
 _DEPENDENT = 1e-11
 
@@ -48,22 +50,21 @@ class ActiveSet:
             z: an approximate solution (n,).
             y: its multipliers (rows,).
         """
-        given = Refined(z, y, residuals(qp, z, y), 0)
-        space = self._prepared(qp)
-        if space is None:
-            return given
-        rows = qp.products.G @ z
-        side = (qp.u - rows < y).astype(int) - (rows - qp.l < -y)
-        side[space.equal] = 0
-        search = _Search(qp, space, side)
-        if not (search.exchange_all() or search.exchange_single()):
-            return given._replace(systems=search.systems)
-        met = search.met
-        found = space.optimum(qp, met, search.bound[met])
-        if found is None:
-            return given._replace(systems=search.systems)
-        exact = Refined(*found, residuals(qp, *found), search.systems + 1)
-        return exact if max(exact.residuals) < max(given.residuals) else given
+        space, systems = self._prepared(qp), 0
+        if space is not None:
+            rows = qp.products.G @ z
+            side = (qp.u - rows < y).astype(int) - (rows - qp.l < -y)
+            side[space.equal] = 0
+            search = _Search(qp, space, side)
+            solved = search.exchange_all() or search.exchange_single()
+            found = space.optimum(qp, search.met, search.limits()) if solved else None
+            systems = search.systems + 1
+            if found is not None:
+                remain = residuals(qp, *found)
+                if max(remain) <= _EXACT:
+                    return Refined(*found, remain, systems)
+                z, y = min((found, (z, y)), key=lambda point: max(residuals(qp, *point)))
+        return Refined(z, y, residuals(qp, z, y), systems)
 
     def _prepared(self, qp: QP) -> MultiplierSpace | None:
         """Return the program's space; that of the last one if only vectors have changed."""
@@ -83,25 +84,27 @@ class _Search:
 
     Attributes:
         side: of each row: 1 met at its upper bound, -1 at its lower one, 0 not met.
+        met: indices of the rows that are met.
         systems: number of systems solved.
     """
 
     def __init__(self, qp: QP, space: MultiplierSpace, side: np.ndarray) -> None:
         self._qp, self._space, self.side, self.systems = qp, space, side, 0
+        self.met = np.flatnonzero(side)
         self._start = space.free(qp)
         self._n = len(qp.g)
         self._rows = qp.products.G @ self._start[: self._n]
         self._rounding = _ROUNDING * (1.0 + np.abs(self._rows).max(initial=0.0))
 
-    @property
-    def met(self) -> np.ndarray:
-        """Indices of the rows that are met."""
-        return np.flatnonzero(self.side)
+    def limits(self) -> np.ndarray:
+        """Return what each met row is equal to."""
+        met = self.met
+        return np.where(self.side[met] > 0, self._qp.u[met], self._qp.l[met])
 
-    @property
-    def bound(self) -> np.ndarray:
-        """What each row is equal to if it is met."""
-        return np.where(self.side > 0, self._qp.u, self._qp.l)
+    def put(self, rows: np.ndarray | int, side: np.ndarray | int) -> None:
+        """Say at which bound rows are met, or with 0 that they are not."""
+        self.side[rows] = side
+        self.met = np.flatnonzero(self.side)
 
     def exchange_all(self) -> bool:
         """Exchange all wrong rows at once; return whether that ended at the solution."""
@@ -110,13 +113,13 @@ class _Search:
             y = self._multipliers()
             if y is None:
                 return False
-            excess = self._excess(self.met, y)
-            wrong = self._wrong(y)
-            enters = np.abs(excess) > self._rounding
-            if not (wrong.any() or enters.any()):
+            excess = self._excess(y)
+            wrong = self.met[self._wrong(y)]
+            enters = np.flatnonzero(np.abs(excess) > self._rounding)
+            if not (wrong.size or enters.size):
                 return True
-            self.side[self.met[wrong]] = 0
-            self.side[enters] = np.sign(excess[enters])
+            self.side[wrong] = 0
+            self.put(enters, np.sign(excess[enters]).astype(int))
             key = self.side.tobytes()
             if key in seen:
                 return False
@@ -127,8 +130,7 @@ class _Search:
         """Exchange one row at a time; False if there is no solution (or rounding hides it)."""
         y = self._shrink()
         for _ in range(4 * len(self.side)):
-            met = self.met
-            excess = self._excess(met, y)
+            excess = self._excess(y)
             row = int(np.abs(excess).argmax())
             if np.abs(excess[row]) <= self._rounding:
                 return True
@@ -146,15 +148,15 @@ class _Search:
         met = self.met
         if not met.size:
             return np.empty(0)
-        _, y, failed = LAPACK.dposv(self._space.gram(met), self._rows[met] - self.bound[met])
+        _, y, failed = LAPACK.dposv(self._space.gram(met), self._rows[met] - self.limits())
         return None if failed else y
 
-    def _excess(self, met: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def _excess(self, y: np.ndarray) -> np.ndarray:
         """Return by how much each row that is not met exceeds its bounds, negative below."""
-        qp, z = self._qp, (self._start - self._space.pull(met, y))[: self._n]
+        qp, z = self._qp, (self._start - self._space.pull(self.met, y))[: self._n]
         rows = qp.products.G @ z
         excess = np.maximum(rows - qp.u, 0.0) + np.minimum(rows - qp.l, 0.0)
-        excess[met] = 0.0
+        excess[self.met] = 0.0
         excess[self._space.equal] = 0.0
         return excess
 
@@ -169,7 +171,7 @@ class _Search:
             wrong = np.ones(self.met.size, dtype=bool) if y is None else self._wrong(y)
             if y is not None and not wrong.any():
                 return y
-            self.side[self.met[wrong]] = 0
+            self.put(self.met[wrong], 0)
         return np.empty(0)
 
     def _enter(self, row: int, excess: float, y: np.ndarray) -> np.ndarray | None:
@@ -200,7 +202,7 @@ class _Search:
             own += sign * length
             excess -= sign * curvature * length
             if full <= first:
-                self.side[row] = int(sign)
+                self.put(row, int(sign))
                 return np.insert(y, int(np.searchsorted(met, row)), own)
-            self.side[met[blocking]] = 0
+            self.put(met[blocking], 0)
             y = np.delete(y, blocking)

@@ -17,6 +17,7 @@ _REGULARISATION = 1e-12
 # How often what rounding left over is corrected; an unstable plant whose inputs are all at a
 # bound needs it twice.
 _CORRECTIONS = 2
+_EXACT = 1e-15
 
 
 class Optimum(NamedTuple):
@@ -98,6 +99,9 @@ class MultiplierSpace:
             left = -(products.H @ z + qp.g + products.Gt @ y)
             right = np.concatenate([left, (qp.u - reached)[self._equations]])
             wanted = bound - reached[rows]
+            size = 1.0 + max(np.abs(y).max(initial=0.0), np.abs(qp.g).max())
+            if max(np.abs(right).max(), np.abs(wanted).max(initial=0.0)) <= _EXACT * size:
+                break
         return Optimum(z, y)
 
     def _slots(self, rows: np.ndarray) -> np.ndarray:

@@ -18,6 +18,8 @@ from solvers.linear.quadratic_program import NO_POINT, QP, Residuals, residuals
 
 # A backend measures its residuals in its own way; it is asked for this much more.
 _MARGIN = 0.1
+# A matrix with more than this part of its entries not zero is given as a dense one.
+_FILLED = 0.2
 # What goes wrong inside a backend is its failure, never a sign that it is not installed.
 _INSIDE = (QPError, ArithmeticError, LookupError, RuntimeError, ValueError, TypeError)
 
@@ -66,6 +68,7 @@ class OSQPBackend(Backend):
         """Set nothing up yet."""
         self._tolerance = tolerance
         self._solver: osqp.OSQP | None = None
+        self._settings: tuple[float, int] | None = None
         self._refiner = ActiveSet()
         self._h: sp.csc_matrix | None = None
         self._g: sp.csc_matrix | None = None
@@ -79,7 +82,7 @@ class OSQPBackend(Backend):
             solver.warm_start(x=start)
         iterations, word, best = 0, "", None
         for eps, most in self._LADDER:
-            solver.update_settings(eps_abs=eps, eps_rel=eps, max_iter=most)
+            self._set(solver, eps, most)
             result = solver.solve(raise_error=False)
             iterations, word = iterations + int(result.info.iter), str(result.info.status)
             if "infeasible" in word or not np.isfinite(result.x).all():
@@ -96,6 +99,12 @@ class OSQPBackend(Backend):
             return Answer(None, None, word, iterations, factorisations)
         return Answer(best.z, best.y, word, iterations, factorisations, best.residuals)
 
+    def _set(self, solver: osqp.OSQP, eps: float, most: int) -> None:
+        """Change tolerance and number of iterations, if they are others."""
+        if self._settings != (eps, most):
+            solver.update_settings(eps_abs=eps, eps_rel=eps, max_iter=most)
+            self._settings = eps, most
+
     def _prepare(self, qp: QP) -> int:
         """Bring the workspace up to date; return how often it factorised."""
         if self._solver is not None and qp.H is self._h and qp.G is self._g:
@@ -107,7 +116,7 @@ class OSQPBackend(Backend):
             self._solver.update(q=qp.g, l=qp.l, u=qp.u)
             self._solver.update(Px=upper.data, Ax=qp.G.data)
         else:
-            self._solver = osqp.OSQP()
+            self._solver, self._settings = osqp.OSQP(), None
             rows = (qp.G, qp.l, qp.u)
             self._solver.setup(upper, qp.g, *rows, verbose=False, **_OSQP)
         self._h, self._g = qp.H, qp.G
@@ -128,7 +137,7 @@ class NamedBackend(Backend):
     def solve(self, qp: QP, start: np.ndarray | None = None) -> Answer:
         """Solve from scratch; rows are sorted only when they have changed."""
         if self._rows is None or not self._rows.fit(qp):
-            self._rows = _Rows(qp, self._name in qpsolvers.sparse_solvers)
+            self._rows = _Rows(qp, self._takes_sparse(qp))
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -144,6 +153,13 @@ class NamedBackend(Backend):
             return Answer(z, y, word, residuals=remain)
         better = self._refiner.refine(qp, z, y)
         return Answer(better.z, better.y, word, 0, 1 + better.systems, better.residuals)
+
+    def _takes_sparse(self, qp: QP) -> bool:
+        """Whether the backend is given sparse matrices: where it can, and they are sparse."""
+        if self._name not in qpsolvers.dense_solvers:
+            return True
+        filled = qp.G.nnz > _FILLED * max(1, len(qp.l) * len(qp.g))
+        return self._name in qpsolvers.sparse_solvers and not filled
 
 
 class _Rows:
