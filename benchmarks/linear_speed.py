@@ -1,8 +1,13 @@
-"""What a step of linear control costs: over the horizon, and beside qpmpc."""
+"""What a step of linear control costs: over the horizon, and beside qpmpc.
+
+Times are processor times of this process, so that other programs of the machine do not count;
+what matters are exponents and ratios of one run.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import process_time
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +21,8 @@ FITTED_FROM = 50
 PEER_HORIZON = 20
 DT, BOUND, FORCE = 0.05, 2.0, 40.0
 STATE_WEIGHT, INPUT_WEIGHT, END_WEIGHT = 100.0, 0.5, 100.0
+Form = Literal["sparse", "condensed"]
+FORMS: tuple[Form, ...] = ("sparse", "condensed")
 # A method that takes longer than this for one step is not measured at longer horizons [s].
 _PATIENCE = 2.0
 
@@ -58,7 +65,7 @@ class Pair:
     """
 
     backend: str
-    form: str
+    form: Form
     ours: float
     theirs: float
     ratio: float
@@ -175,12 +182,12 @@ def peer_pairs(backends: Sequence[str], count: int = 80) -> list[Pair] | None:
     return [
         _pair(backend, form, QpmpcStep(PEER_HORIZON, backend), seen)
         for backend in backends
-        for form in ("sparse", "condensed")
+        for form in FORMS
     ]
 
 
 def _pair(
-    backend: str, form: str, peer: Callable[[Situation], float], seen: Sequence[Situation]
+    backend: str, form: Form, peer: Callable[[Situation], float], seen: Sequence[Situation]
 ) -> Pair:
     program = LinearMPC(backend=backend, form=form).build(mass_tracking(PEER_HORIZON))
     ours, theirs, apart = [], [], []

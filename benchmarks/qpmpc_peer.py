@@ -1,17 +1,21 @@
 """The same problem by qpmpc [Caron et al. 2024]: its fastest way through a closed loop."""
 
 import warnings
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import qpsolvers
-from qpmpc import MPCQP, MPCProblem
 
 from benchmarks import linear_speed as ours
 from models import mass_spring_damper
 
 if TYPE_CHECKING:
     from benchmarks.linear_speed import Situation
+
+
+# Not among the requirements, so that its types are unknown.
+_QPMPC: Any = import_module("qpmpc")
 
 
 class QpmpcStep:
@@ -32,7 +36,7 @@ class QpmpcStep:
         on_input.append(np.vstack([both, 0 * both, row @ plant.B]))
         limits = [force] + [np.append(force, state)] * (steps - 2)
         limits.append(np.concatenate([force, state, state]))
-        self._problem = MPCProblem(
+        self._problem = _QPMPC.MPCProblem(
             transition_state_matrix=plant.A,
             transition_input_matrix=plant.B,
             ineq_state_matrix=on_state,
@@ -47,7 +51,7 @@ class QpmpcStep:
             target_states=np.zeros(2 * steps),
         )
         self._backend = backend
-        self._program = MPCQP(self._problem, sparse=backend in _SPARSE)
+        self._program = _QPMPC.MPCQP(self._problem, sparse=backend in _SPARSE)
 
     def __call__(self, now: "Situation") -> float:
         """Return the first input at a situation."""
@@ -60,7 +64,7 @@ class QpmpcStep:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = qpsolvers.solve_problem(program.problem, solver=self._backend)
-        return float(found.x[0])
+        return float("nan") if found.x is None else float(found.x[0])
 
 
 # Backends that know sparse matrices only.

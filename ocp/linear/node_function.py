@@ -1,5 +1,7 @@
 """A CasADi Function at all nodes at once, on arrays as they are."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
@@ -16,7 +18,9 @@ class NodeFunction:
         """Compile, and open the Function's own memory."""
         self._function = function.map(count)
         self._shape = count, function.numel_out(0)
-        self._buffer, self._evaluate = self._function.buffer()
+        # Its stub asks for an argument too many.
+        buffer: Any = self._function.buffer()
+        self._buffer, self._evaluate = buffer
 
     def __call__(self, t: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Return the values (count, rows) at times (count,) with parameters (count, n_p)."""
@@ -24,8 +28,8 @@ class NodeFunction:
         inputs = [np.ascontiguousarray(given, dtype=float) for given in (t, p)]
         for i, given in enumerate(inputs):
             if given.size:
-                self._buffer.set_arg(i, memoryview(given))
+                self._buffer.set_arg(i, given.data)
         if values.size:
-            self._buffer.set_res(0, memoryview(values))
+            self._buffer.set_res(0, values.data)
             self._evaluate()
         return values
