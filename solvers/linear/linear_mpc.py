@@ -22,6 +22,7 @@ from ocp import (
     Start,
     Status,
     Work,
+    instance,
     linear_quadratic,
 )
 from solvers.linear import recursion
@@ -70,6 +71,9 @@ class LinearMPC(Solver):
         """Check the options."""
         if self.form not in _FORMS:
             raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
+        number = (int, float, np.integer, np.floating)
+        instance(self.tolerance, number, "LinearMPC: tolerance")
+        instance(self.soft, (*number, type(None)), "LinearMPC: soft")
         if not 0.0 < self.tolerance < 1.0:
             raise ProblemError(f"LinearMPC: tolerance = {self.tolerance}, it must be in (0, 1)")
         if self.soft is not None and not 0.0 < self.soft < np.inf:

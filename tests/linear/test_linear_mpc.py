@@ -264,7 +264,13 @@ def test_residuals_are_those_of_the_program():
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"form": "dense"}, "form"), ({"tolerance": 0.0}, "tolerance"), ({"soft": -1.0}, "price")],
+    [
+        ({"form": "dense"}, "form"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"tolerance": "tight"}, "tolerance is a str"),
+        ({"soft": -1.0}, "price"),
+        ({"soft": "dear"}, "soft is a str"),
+    ],
 )
 def test_bad_options_are_refused(options, message):
     with pytest.raises(ProblemError, match=message):
