@@ -50,8 +50,9 @@ class LinearMPC(Solver):
     when primal, dual and gap residual are within the tolerance, all relative.
 
     Stability needs a terminal cost from the algebraic Riccati equation
-    (``ocp.with_stationary_end``) and a horizon at whose end no constraint is active
-    [Mayne et al. 2000]; or simply a horizon that is long.
+    (``ocp.with_stationary_end``) and a horizon at whose end no constraint is active, or the
+    terminal set with it (``ocp.with_terminal_set``) [Mayne et al. 2000]; or simply a horizon
+    that is long.
 
     Args:
         backend: ``"osqp"`` [Stellato et al. 2020], or any backend of qpsolvers by its name.
