@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench | figures``."""
+"""Command line: ``python -m benchmarks list | run | bench | figures | speed | greedy``."""
 
 import argparse
 import sys
@@ -13,10 +13,13 @@ from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
 from benchmarks.extremes import extremes_table
 from benchmarks.figures import FIGURES, chosen, draw_all
+from benchmarks.greedy_gap import greedy_table
 from benchmarks.jacobians import jacobian_table
+from benchmarks.linear_speed import HORIZONS
 from benchmarks.methods import Method, Settings, all_methods
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
+from benchmarks.speed_tables import print_speed
 from benchmarks.sweep import sweep, tasks_of
 from benchmarks.table import table_of
 
@@ -44,6 +47,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _bench(console, options.out, options.workers)
     if options.command == "figures":
         return _figures(console, options.numbers, options.out)
+    if options.command == "speed":
+        print_speed(console, options.horizons, options.count)
+        return 0
+    if options.command == "greedy":
+        console.print(greedy_table())
+        return 0
     cases = _chosen(all_cases(), options.case, "case")
     if options.suite:
         cases = [case for case in cases if case.suite == options.suite]
@@ -71,6 +80,10 @@ def _parser() -> argparse.ArgumentParser:
     figures = commands.add_parser("figures", help="figures of the thesis, with their data")
     known = ", ".join(figure.number for figure in FIGURES)
     figures.add_argument("numbers", nargs="*", metavar="NUMBER", help=f"of {known}; none: all")
+    speed = commands.add_parser("speed", help="linear control: a step over N, and beside qpmpc")
+    speed.add_argument("--horizons", nargs="+", type=_positive, default=HORIZONS, metavar="N")
+    speed.add_argument("--count", type=_positive, default=20, metavar="K", help="steps measured")
+    commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
     for command in (run, bench, figures):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser

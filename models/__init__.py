@@ -12,16 +12,18 @@ from models.double_integrator import (
 )
 from models.linear import (
     LinearPlant,
-    lq_regulator,
     mass_spring_damper,
-    sinusoid,
     stable_plant,
     state_space,
+    unstable_plant,
+)
+from models.linear_problems import (
+    lq_regulator,
+    sinusoid,
     step_reference,
     thesis_regulator,
     thesis_tracking,
     tracking_ocp,
-    unstable_plant,
 )
 from models.obstacles import Disc, distance_to_segment, link_distances
 from models.oscillators import hypersensitive, rayleigh, van_der_pol

@@ -13,6 +13,7 @@ from ocp.linear.input_rate import with_input_rate
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import Stationary, stationary, with_stationary_end
 from ocp.linear.structure import linear_quadratic
+from ocp.linear.terminal_set import Polyhedron, terminal_set, with_terminal_set
 from ocp.model import Model
 from ocp.mpc.applied import Applied
 from ocp.mpc.decision import Controller, ControlRefused, Decision, Outcome
@@ -62,6 +63,7 @@ __all__ = [
     "Parameter",
     "ParameterValues",
     "Plant",
+    "Polyhedron",
     "ProblemError",
     "Program",
     "Record",
@@ -93,7 +95,9 @@ __all__ = [
     "solve",
     "stationary",
     "symbol_kind",
+    "terminal_set",
     "whole",
     "with_input_rate",
     "with_stationary_end",
+    "with_terminal_set",
 ]

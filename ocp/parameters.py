@@ -141,6 +141,14 @@ class ParameterValues:
         blocks = [e.at(v, points, side) for e, v in zip(self.entries, self.values, strict=True)]
         return np.hstack([np.empty((len(points), 0)), *blocks])
 
+    def samples(self, count: int) -> np.ndarray:
+        """Return the stacked vector where every signal has ``count`` samples, (count, n_p)."""
+        blocks = [
+            v if isinstance(e, Signal) else np.broadcast_to(v, (count, len(v)))
+            for e, v in zip(self.entries, self.values, strict=True)
+        ]
+        return np.hstack(blocks) if blocks else np.empty((count, 0))
+
     def on(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the values at the left and the right end of each interval, (N, n_p) each.
 

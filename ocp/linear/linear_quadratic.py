@@ -1,7 +1,7 @@
 """A linear-quadratic problem as arrays: sampled by one call on the data of a run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,13 +12,16 @@ from numpy.typing import ArrayLike
 from ocp.constraint import Box
 from ocp.data import Data
 from ocp.errors import ProblemError
+from ocp.expressions import numbers
+from ocp.linear.node_function import NodeFunction
 from ocp.problem import OCP
 
 # An eigenvalue this much below zero, relative to the largest one, is rounding.
 _ROUNDING = 1e-10
 
 
-class Matrices(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Matrices:
     """What multiplies states and controls, stage by stage.
 
     Attributes:
@@ -43,10 +46,15 @@ class Matrices(NamedTuple):
     D_u: np.ndarray
     D_f: np.ndarray
 
-    @property
+    @cached_property
     def weights(self) -> np.ndarray:
         """The blocks [[Q, S], [S', R]], (N, n + m, n + m)."""
         return np.block([[self.Q, self.S], [self.S.transpose(0, 2, 1), self.R]])
+
+    @cached_property
+    def D(self) -> np.ndarray:
+        """The constraint rows [D_x, D_u] at nodes 0..N-1, (N, rows, n + m)."""
+        return np.concatenate([self.D_x, self.D_u], axis=2)
 
     def indefinite(self) -> str | None:
         """Return which weight is not as (positive) definite as it must be, or None."""
@@ -73,8 +81,7 @@ class LQData(NamedTuple):
     Attributes:
         matrices: what multiplies states and controls.
         c: affine terms of the dynamics (N, n).
-        q: linear terms of the cost (N, n), counted twice as all cross terms.
-        r: (N, m).
+        qr: linear terms q and r of the cost (N, n + m), counted twice as all cross terms.
         constant: sum of the constant terms, the terminal one included.
         p: terminal linear term (n,).
         lower: bounds of the rows at nodes 0..N-1 (N, rows).
@@ -85,14 +92,23 @@ class LQData(NamedTuple):
 
     matrices: Matrices
     c: np.ndarray
-    q: np.ndarray
-    r: np.ndarray
+    qr: np.ndarray
     constant: float
     p: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     lower_f: np.ndarray
     upper_f: np.ndarray
+
+    @property
+    def q(self) -> np.ndarray:
+        """Linear terms in the states, (N, n)."""
+        return self.qr[:, : self.c.shape[1]]
+
+    @property
+    def r(self) -> np.ndarray:
+        """Linear terms in the controls, (N, m)."""
+        return self.qr[:, self.c.shape[1] :]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +154,7 @@ class LinearQuadratic:
     row_box: Box
     end_box: Box
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Number of steps N."""
         return self.ocp.steps or 0
@@ -147,7 +163,9 @@ class LinearQuadratic:
         self, x0: ArrayLike | None, t0: float, parameters: Mapping[str, ArrayLike] | None
     ) -> Data:
         """Return the data of a run; a measured start may lie outside the state bounds."""
-        return Data(self._unbounded.start(x0), t0, self.ocp.parameter_values(parameters))
+        given, name = self.ocp.x0 if x0 is None else x0, f"{self.ocp.name}: x0"
+        start = numbers(given, self.ocp.model.nx, name)
+        return Data(start, t0, self.ocp.parameter_values(parameters))
 
     def on(self, data: Data) -> LQData:
         """Return the numbers of a run.
@@ -167,10 +185,6 @@ class LinearQuadratic:
     # -- sampling ---------------------------------------------------------------------------
 
     @cached_property
-    def _unbounded(self) -> OCP:
-        return replace(self.ocp, state_bounds=Box())
-
-    @cached_property
     def fixed(self) -> Matrices | None:
         """The matrices, where they depend on neither time nor parameters."""
         varying = any(
@@ -188,35 +202,33 @@ class LinearQuadratic:
         return self.data(None, 0.0, None)
 
     @cached_property
-    def _fractions(self) -> np.ndarray:
-        return np.linspace(0.0, 1.0, self.steps + 1)
+    def nodes(self) -> np.ndarray:
+        """Instants of the nodes after t0 [s], (N + 1,)."""
+        return np.linspace(0.0, self.ocp.duration, self.steps + 1)
 
     @cached_property
-    def _stages(self) -> tuple[ca.Function, ca.Function]:
-        return self.stage_matrices.map(self.steps), self.stage_vectors.map(self.steps)
+    def _vectors(self) -> tuple[NodeFunction, NodeFunction]:
+        return NodeFunction(self.stage_vectors, self.steps), NodeFunction(self.end_vectors, 1)
 
-    def _at(self, data: Data) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-        """Times (1, N), parameters (n_p, N) at the stages; time and parameters at the end."""
-        p = data.values.at(self._fractions, 1)
-        t = data.t0 + self._fractions * self.ocp.duration
-        return t[None, :-1], p[:-1].T, float(t[-1]), p[-1]
+    def _at(self, data: Data) -> tuple[np.ndarray, np.ndarray]:
+        """Return times (N + 1,) and parameters (N + 1, n_p) at the nodes."""
+        return data.t0 + self.nodes, data.values.samples(self.steps + 1)
 
     def sample_matrices(self, data: Data) -> Matrices:
         """Return the matrices of a run, whether convex or not."""
-        t, p, t_end, p_end = self._at(data)
+        t, p = self._at(data)
         blocks = [
             np.array(m).reshape(m.shape[0], self.steps, m.shape[1] // self.steps).transpose(1, 0, 2)
-            for m in self._stages[0](t, p)
+            for m in self.stage_matrices.map(self.steps)(t[None, :-1], p[:-1].T)
         ]
-        end = [np.array(m) for m in self.end_matrices(t_end, p_end)]
+        end = [np.array(m) for m in self.end_matrices(t[-1], p[-1])]
         a, b, q, s, r, d_x, d_u = blocks
         return Matrices(a, b, q, s, r, end[0], d_x, d_u, end[1])
 
     def _sample_vectors(self, data: Data, matrices: Matrices) -> LQData:
-        t, p, t_end, p_end = self._at(data)
-        n, m, steps = self.ocp.model.nx, self.ocp.model.nu, self.steps
-        stage = np.array(self._stages[1](t, p)).reshape(-1, steps).T
-        end = np.array(self.end_vectors(t_end, p_end)).ravel()
+        t, p = self._at(data)
+        _, n, m = matrices.B.shape
+        stage, end = self._vectors[0](t[:-1], p[:-1]), self._vectors[1](t[-1:], p[-1:])[0]
         if not (np.isfinite(stage).all() and np.isfinite(end).all()):
             raise ProblemError(f"{self.ocp.name}: a linear term is not finite for these data")
         k = 2 * n + m
@@ -226,8 +238,7 @@ class LinearQuadratic:
         return LQData(
             matrices=matrices,
             c=stage[:, :n],
-            q=stage[:, n : 2 * n],
-            r=stage[:, 2 * n : k],
+            qr=stage[:, n:k],
             constant=float(stage[:, k].sum() + end[n]),
             p=end[:n],
             lower=lower,

@@ -102,9 +102,12 @@ class BatchProgram(Program):
         stacked = self.fixed or self._stack(numbers.matrices)
         x, u, status, message = self._solve(stacked, numbers, data.x0)
         finite = status is not Status.DIVERGED
-        by_x, by_u = recursion.slopes(numbers, x, u)
-        final = 2.0 * (numbers.matrices.P @ x[-1] + numbers.p)
-        costate, h_u = recursion.adjoint(numbers, stacked.prediction.feedback, by_x, by_u, final)
+        n, m = len(data.x0), numbers.matrices
+        half = recursion.half_slopes(numbers, x, u)
+        by_x, by_u = 2.0 * half[:, :n], 2.0 * half[:, n:]
+        final = 2.0 * (m.P @ x[-1] + numbers.p)
+        costate = stacked.prediction.costates(by_x, by_u, final)
+        h_u = by_u + (costate[1:, None] @ m.B)[:, 0]
         finite = finite and bool(np.isfinite(costate).all())
         ocp = self.lq.ocp
         return Solution(
@@ -112,12 +115,12 @@ class BatchProgram(Program):
             solver=repr(self.solver),
             status=status,
             message=message,
-            t=t0 + np.linspace(0.0, ocp.duration, self.lq.steps + 1),
+            t=t0 + self.lq.nodes,
             x=x,
             x0=data.x0,
             costate=costate if finite else np.zeros_like(x),
             u=u,
-            cost=recursion.cost(numbers, x, u) if finite else np.inf,
+            cost=recursion.cost(numbers, x, u, half) if finite else np.inf,
             residual=float(np.abs(h_u).max()) if finite else np.inf,
             iterations=1,
             work=Work(rollouts=1, factorisations=1),

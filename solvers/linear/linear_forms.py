@@ -72,8 +72,17 @@ class Form(ABC):
         """Return the point of states and controls: a warm start."""
 
     @abstractmethod
-    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the costates (N + 1, n); at an active bound the value just before the node."""
+    def costates(
+        self, y: np.ndarray, data: LQData, x_end: np.ndarray, half: np.ndarray
+    ) -> np.ndarray:
+        """Return the costates (N + 1, n); at an active bound the value just before the node.
+
+        Args:
+            y: multipliers of all rows.
+            data: the numbers of the run.
+            x_end: last state (n,).
+            half: half the slopes of the running cost (N, n + m).
+        """
 
     def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the multipliers of the stage rows (N, rows) and of the end rows."""
@@ -173,12 +182,13 @@ class Sparse(Form):
         z[self._u], z[self._after] = u, x[1:]
         return z
 
-    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def costates(
+        self, y: np.ndarray, data: LQData, x_end: np.ndarray, half: np.ndarray
+    ) -> np.ndarray:
         """Return minus the multipliers of x_{k+1} - A x_k - B u_k = c_k, and what follows at 0."""
         m = data.matrices
         later = -y[: self.equations].reshape(self._after.shape)
-        first = 2.0 * (m.Q[0] @ x[0] + m.S[0] @ u[0] + data.q[0])
-        first += m.A[0].T @ later[0] + m.D_x[0].T @ self.split(y)[0][0]
+        first = 2.0 * half[0, : len(x_end)] + later[0] @ m.A[0] + self.split(y)[0][0] @ m.D_x[0]
         return np.vstack([first, later])
 
 
@@ -194,8 +204,7 @@ class Condensed(Form):
         """Stack the matrices."""
         feedback = recursion.stabilising(matrices, self.lq.ocp.name)
         self._prediction = p = Prediction.of(matrices, feedback)
-        n, on = matrices.A.shape[1], self.lq.on_control
-        stage = matrices.D_x @ p.stages[:, :n] + matrices.D_u @ p.stages[:, n:]
+        on, stage = self.lq.on_control, matrices.D @ p.stages
         width = p.end.shape[1]
         rows = [stage[0, on], stage[1:].reshape(-1, width), matrices.D_f @ p.end]
         self.H, self.G = sp.csc_matrix(p.hessian), sp.csc_matrix(np.vstack(rows))
@@ -209,8 +218,7 @@ class Condensed(Form):
         """Return g, l and u."""
         m, on = data.matrices, self.lq.on_control
         z, x_end = self._stacked.nominal(data, x0)
-        n = len(x0)
-        rows = np.einsum("kij,kj->ki", m.D_x, z[:, :n]) + np.einsum("kij,kj->ki", m.D_u, z[:, n:])
+        rows = (m.D @ z[:, :, None])[:, :, 0]
         known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
         low, high = self._bounds(data)
         return Vectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
@@ -221,16 +229,16 @@ class Condensed(Form):
 
     def point(self, x: np.ndarray, u: np.ndarray, data: LQData) -> np.ndarray:
         """Return V = u + Kx."""
-        return (u + np.einsum("kij,kj->ki", self._stacked.feedback, x[:-1])).ravel()
+        return (u + (self._stacked.feedback @ x[:-1, :, None])[:, :, 0]).ravel()
 
-    def costates(self, y: np.ndarray, data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    def costates(
+        self, y: np.ndarray, data: LQData, x_end: np.ndarray, half: np.ndarray
+    ) -> np.ndarray:
         """Return the adjoint of cost and constraints."""
         m, (stage, end) = data.matrices, self.split(y)
-        by_x, by_u = recursion.slopes(data, x, u)
-        by_x = by_x + np.einsum("kij,ki->kj", m.D_x, stage)
-        by_u = by_u + np.einsum("kij,ki->kj", m.D_u, stage)
-        final = 2.0 * (m.P @ x[-1] + data.p) + m.D_f.T @ end
-        return recursion.adjoint(data, self._stacked.feedback, by_x, by_u, final)[0]
+        slope, n = 2.0 * half + (stage[:, None] @ m.D)[:, 0], len(x_end)
+        final = 2.0 * (m.P @ x_end + data.p) + end @ m.D_f
+        return self._stacked.costates(slope[:, :n], slope[:, n:], final)
 
 
 class _Block(NamedTuple):

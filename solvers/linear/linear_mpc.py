@@ -22,17 +22,17 @@ from ocp import (
     Start,
     Status,
     Work,
+    instance,
     linear_quadratic,
 )
 from solvers.linear import recursion
 from solvers.linear.elastic import least_violation
 from solvers.linear.linear_forms import Condensed, Form, Sparse
 from solvers.linear.qp_backends import Answer, Backend, qp_backend
-from solvers.linear.quadratic_program import QP, Residuals, Softening, residuals
+from solvers.linear.quadratic_program import QP, Softening
 
 # A constraint that no point can meet better than this is infeasible, not inaccurate.
 _UNAVOIDABLE = 1e-7
-_NOTHING = Residuals(np.inf, np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,9 @@ class LinearMPC(Solver):
     when primal, dual and gap residual are within the tolerance, all relative.
 
     Stability needs a terminal cost from the algebraic Riccati equation
-    (``ocp.with_stationary_end``) and a horizon at whose end no constraint is active
-    [Mayne et al. 2000]; or simply a horizon that is long.
+    (``ocp.with_stationary_end``) and a horizon at whose end no constraint is active, or the
+    terminal set with it (``ocp.with_terminal_set``) [Mayne et al. 2000]; or simply a horizon
+    that is long.
 
     Args:
         backend: ``"osqp"`` [Stellato et al. 2020], or any backend of qpsolvers by its name.
@@ -71,6 +72,9 @@ class LinearMPC(Solver):
         """Check the options."""
         if self.form not in _FORMS:
             raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
+        number = (int, float, np.integer, np.floating)
+        instance(self.tolerance, number, "LinearMPC: tolerance")
+        instance(self.soft, (*number, type(None)), "LinearMPC: soft")
         if not 0.0 < self.tolerance < 1.0:
             raise ProblemError(f"LinearMPC: tolerance = {self.tolerance}, it must be in (0, 1)")
         if self.soft is not None and not 0.0 < self.soft < np.inf:
@@ -129,12 +133,10 @@ class LinearMPCProgram(Program):
         if matrices is w.matrices:
             return
         self.form.set_matrices(matrices)
-        nothing = np.empty(0)
-        w.matrices, w.hard = matrices, QP(self.form.H, self.form.G, nothing, nothing, nothing)
+        w.matrices, w.hard = matrices, QP.of(self.form.H, self.form.G)
         w.soft = w.hard
         if self.softening:
-            h, g = self.softening.soften(self.form.H, self.form.G)
-            w.soft = QP(h, g, nothing, nothing, nothing)
+            w.soft = QP.of(*self.softening.soften(self.form.H, self.form.G))
 
     def quadratic_program(self, data: Data) -> QP:
         """Return the (soft) program of a run, for who wants to solve it elsewhere."""
@@ -154,27 +156,26 @@ class LinearMPCProgram(Program):
         numbers = self.lq.on(data)
         hard, qp = self._programs(data, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
-        found = _NOTHING
-        if answer.z is not None and answer.y is not None:
-            found = residuals(qp, answer.z, answer.y)
-        z, y, status, message = self._verdict(answer, found, hard, qp)
+        found = answer.residuals
+        z, y, status, message = self._verdict(answer, hard, qp)
         x, u = self.form.trajectory(z, numbers, data.x0)
-        costate = self.form.costates(y, numbers, x, u)
+        half = recursion.half_slopes(numbers, x, u)
+        costate = self.form.costates(y, numbers, x[-1], half)
         sound = all(np.isfinite(a).all() for a in (x, u, costate))
         if not sound:
             x, u = np.tile(data.x0, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
             costate, status = np.zeros_like(x), Status.DIVERGED
         return Solution(
             problem=self.lq.ocp,
-            solver=repr(self.solver),
+            solver=self._name,
             status=status,
             message=message,
-            t=t0 + self._clock,
+            t=t0 + self.lq.nodes,
             x=x,
             x0=data.x0,
             costate=costate,
             u=u,
-            cost=recursion.cost(numbers, x, u) if sound else np.inf,
+            cost=recursion.cost(numbers, x, u, half) if sound else np.inf,
             residual=max(found),
             iterations=answer.iterations,
             work=Work(rollouts=1, factorisations=answer.factorisations),
@@ -191,8 +192,8 @@ class LinearMPCProgram(Program):
     # -- pieces -----------------------------------------------------------------------------
 
     @cached_property
-    def _clock(self) -> np.ndarray:
-        return np.linspace(0.0, self.lq.ocp.duration, self.lq.steps + 1)
+    def _name(self) -> str:
+        return repr(self.solver)
 
     def _programs(self, data: Data, numbers: LQData) -> tuple[QP, QP]:
         """Return the program with hard constraints, and the one to solve."""
@@ -201,10 +202,10 @@ class LinearMPCProgram(Program):
         assert w.hard is not None
         assert w.soft is not None
         vectors = self.form.vectors(numbers, data.x0)
-        hard = QP(w.hard.H, w.hard.G, *vectors)
+        hard = w.hard.with_vectors(*vectors)
         if self.softening is None:
             return hard, hard
-        return hard, QP(w.soft.H, w.soft.G, *self.softening.bounds(*vectors))
+        return hard, w.soft.with_vectors(*self.softening.bounds(*vectors))
 
     def _warm_start(self, guess: Start | None, numbers: LQData, qp: QP) -> np.ndarray | None:
         if guess is None:
@@ -218,10 +219,10 @@ class LinearMPCProgram(Program):
         return np.concatenate([z, np.zeros(len(qp.g) - len(z))])
 
     def _verdict(
-        self, answer: Answer, found: Residuals, hard: QP, qp: QP
+        self, answer: Answer, hard: QP, qp: QP
     ) -> tuple[np.ndarray, np.ndarray, Status, str]:
         """Return point, multipliers, status and message."""
-        size, rows = len(hard.g), len(hard.l)
+        size, rows, found = len(hard.g), len(hard.l), answer.residuals
         if answer.z is not None and answer.y is not None and max(found) <= self.solver.tolerance:
             y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
             return answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:])

@@ -1,10 +1,30 @@
 """A quadratic program, its residuals, and the exact penalty that makes rows soft."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+
+# Up to this many entries a product with a dense matrix is quicker than with a sparse one.
+_DENSE = 20_000
+
+
+class Products(NamedTuple):
+    """H, G and G' in whatever layout multiplies a vector quickest."""
+
+    H: Any
+    G: Any
+    Gt: Any
+
+    @classmethod
+    def of(cls, h: sp.csc_matrix, g: sp.csc_matrix) -> "Products":
+        """Lay the matrices out."""
+        rows, n = _shape(g)
+        if rows * n <= _DENSE:
+            dense = g.toarray()
+            return cls(h.toarray(), dense, np.ascontiguousarray(dense.T))
+        return cls(h.tocsr(), g.tocsr(), g.T.tocsr())
 
 
 class QP(NamedTuple):
@@ -15,6 +35,7 @@ class QP(NamedTuple):
     Attributes:
         H: symmetric, sparse by columns (n, n).
         G: sparse by columns (rows, n).
+        products: the same, to multiply with.
         g: (n,).
         l: (rows,), equal to ``u`` for an equation.
         u: (rows,).
@@ -22,9 +43,20 @@ class QP(NamedTuple):
 
     H: sp.csc_matrix
     G: sp.csc_matrix
+    products: Products
     g: np.ndarray
     l: np.ndarray  # noqa: E741
     u: np.ndarray
+
+    @classmethod
+    def of(cls, h: sp.csc_matrix, g: sp.csc_matrix) -> "QP":
+        """Return a program whose vectors are still to come, by ``with_vectors``."""
+        nothing = np.empty(0)
+        return cls(h, g, Products.of(h, g), nothing, nothing, nothing)
+
+    def with_vectors(self, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> "QP":
+        """Return the program with the same matrices and these vectors."""
+        return QP(self.H, self.G, self.products, g, low, high)
 
 
 class Residuals(NamedTuple):
@@ -41,6 +73,9 @@ class Residuals(NamedTuple):
     gap: float
 
 
+NO_POINT = Residuals(np.inf, np.inf, np.inf)
+
+
 def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
     """Return the residuals of a point, whatever a backend says about it.
 
@@ -50,14 +85,13 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
         y: multipliers (rows,), positive at upper bounds, negative at lower ones. The sign a
             bound that does not exist would have counts as a dual residual.
     """
-    rows, curved = qp.G @ z, qp.H @ z
-    pulled = qp.G.T @ y
+    rows, curved, pulled = qp.products.G @ z, qp.products.H @ z, qp.products.Gt @ y
     primal = max((qp.l - rows).max(initial=0.0), (rows - qp.u).max(initial=0.0))
     impossible = np.where(y > 0.0, np.isinf(qp.u), np.isinf(qp.l)) * np.abs(y)
     dual = max(np.abs(curved + qp.g + pulled).max(initial=0.0), impossible.max(initial=0.0))
     bound = np.where(y > 0.0, qp.u, qp.l)
     paid = y @ np.where(np.isfinite(bound), bound, 0.0)
-    quadratic, linear = z @ curved, qp.g @ z
+    quadratic, linear = float(z @ curved), float(qp.g @ z)
     sizes = [np.abs(v).max(initial=0.0) for v in (rows, curved, qp.g, pulled)]
     return Residuals(
         primal / (1.0 + sizes[0]),
@@ -90,9 +124,9 @@ class Softening:
         count = len(self.rows)
         unit = sp.identity(count, format="csc")
         select = sp.csc_matrix(
-            (-np.ones(count), (self.rows, np.arange(count))), shape=(_rows(g), count)
+            (-np.ones(count), (self.rows, np.arange(count))), shape=(_shape(g)[0], count)
         )
-        zero = sp.csc_matrix((count, len(g.indptr) - 1))
+        zero = sp.csc_matrix((count, _shape(g)[1]))
         rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
         return (
             sp.csc_matrix(sp.block_diag([h, self.price * unit], format="csc")),
@@ -121,6 +155,6 @@ class Softening:
         return total
 
 
-def _rows(matrix: sp.csc_matrix) -> int:
-    """Height of a matrix; scipy's types do not promise a shape."""
-    return (matrix.shape or (0, 0))[0]
+def _shape(matrix: sp.csc_matrix) -> tuple[int, int]:
+    """Rows and columns of a matrix; scipy's types do not promise a shape."""
+    return matrix.shape or (0, 0)

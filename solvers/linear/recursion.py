@@ -91,53 +91,16 @@ def roll(
     return x, v - np.einsum("kij,kj->ki", feedback, x[:-1])
 
 
-def cost(data: LQData, x: np.ndarray, u: np.ndarray) -> float:
-    """Return the cost of a trajectory."""
-    m, z = data.matrices, x[:-1]
-    running = (
-        np.einsum("ki,kij,kj->", z, m.Q, z)
-        + 2.0 * np.einsum("ki,kij,kj->", z, m.S, u)
-        + np.einsum("ki,kij,kj->", u, m.R, u)
-        + 2.0 * (np.vdot(data.q, z) + np.vdot(data.r, u))
-    )
-    return float(running + x[-1] @ (m.P @ x[-1] + 2.0 * data.p) + data.constant)
+def half_slopes(data: LQData, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Return half the derivatives of the running cost by states and controls, (N, n + m)."""
+    z = np.hstack([x[:-1], u])
+    return (data.matrices.weights @ z[:, :, None])[:, :, 0] + data.qr
 
 
-def slopes(data: LQData, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives of the running cost by states (N, n) and controls (N, m)."""
-    m, z = data.matrices, x[:-1]
-    by_x = np.einsum("kij,kj->ki", m.Q, z) + np.einsum("kij,kj->ki", m.S, u) + data.q
-    by_u = np.einsum("kji,kj->ki", m.S, z) + np.einsum("kij,kj->ki", m.R, u) + data.r
-    return 2.0 * by_x, 2.0 * by_u
-
-
-def adjoint(
-    data: LQData,
-    feedback: np.ndarray,
-    by_x: np.ndarray,
-    by_u: np.ndarray,
-    final: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return costates (N + 1, n) and H_u (N, m), backwards along the closed loop.
-
-    For any feedback K the same costates, where H_u = 0: lambda = L_x - K' L_u + (A - BK)'
-    lambda after. With a stabilising one errors decay on the way.
-
-    Args:
-        data: the problem.
-        feedback: K (N, m, n).
-        by_x: derivatives of the running cost and of the constraints' terms, (N, n).
-        by_u: the same by the control (N, m).
-        final: costate at the end (n,).
-    """
-    m = data.matrices
-    closed = m.A - m.B @ feedback
-    fixed = by_x - np.einsum("kji,kj->ki", feedback, by_u)
-    costate = np.empty((len(by_x) + 1, by_x.shape[1]))
-    costate[-1] = final
-    for i in range(len(by_x) - 1, -1, -1):
-        costate[i] = fixed[i] + costate[i + 1] @ closed[i]
-    return costate, by_u + np.einsum("kji,kj->ki", m.B, costate[1:])
+def cost(data: LQData, x: np.ndarray, u: np.ndarray, half: np.ndarray) -> float:
+    """Return the cost of a trajectory whose half slopes are known."""
+    running = np.vdot(np.hstack([x[:-1], u]), half + data.qr)
+    return float(running + x[-1] @ (data.matrices.P @ x[-1] + 2.0 * data.p) + data.constant)
 
 
 def refuse_constraints(lq: LinearQuadratic, solver: str) -> None:

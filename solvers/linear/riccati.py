@@ -113,17 +113,18 @@ class RiccatiProgram(Program):
         gains = self.fixed_gains or recursion.gains(numbers.matrices)
         p, k = recursion.affine_parts(gains, numbers)
         x, u = recursion.roll(numbers, data.x0, gains.K, -k)
+        half = recursion.half_slopes(numbers, x, u)
         ocp = self.lq.ocp
         return Solution(
             problem=ocp,
             solver=repr(self.solver),
             status=Status.SOLVED,
-            t=t0 + np.linspace(0.0, ocp.duration, self.lq.steps + 1),
+            t=t0 + self.lq.nodes,
             x=x,
             x0=data.x0,
             costate=2.0 * (np.einsum("kij,kj->ki", gains.P, x) + p),
             u=u,
-            cost=recursion.cost(numbers, x, u),
+            cost=recursion.cost(numbers, x, u, half),
             iterations=1,
             work=Work(rollouts=1, factorisations=self.lq.steps),
             parameters=data.values.as_dict(),

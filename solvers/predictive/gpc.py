@@ -7,13 +7,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from ocp import Box, ProblemError, Status
+from ocp import Box, ProblemError, Status, instance
 from solvers.linear.elastic import least_violation
 from solvers.linear.qp_backends import Backend, qp_backend
-from solvers.linear.quadratic_program import QP, residuals
+from solvers.linear.quadratic_program import QP
 from solvers.predictive.carima_prediction import CarimaModel, Prediction, history
 from solvers.predictive.diophantine import added, delayed
 
+_NUMBER = (int, float, np.integer, np.floating)
 # A closed loop with a pole beyond this grows, or does not die out.
 _STABLE = 1.0 - 1e-9
 # A bound that is exceeded by less, relative to 1 + abs(bound), is met.
@@ -66,6 +67,8 @@ class GPC:
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) and not (value is None and name != "n2"):
                 raise ProblemError(f"GPC: {name} = {value!r}, a whole number of steps is needed")
+        for name in ("weight", "tolerance"):
+            instance(getattr(self, name), _NUMBER, f"GPC: {name}")
         if not 0.0 < self.tolerance < 1.0:
             raise ProblemError(f"GPC: tolerance = {self.tolerance}, it must be in (0, 1)")
         if not 0.0 <= self.weight < np.inf:
@@ -249,19 +252,16 @@ class GPCLaw:
         return np.vstack([np.eye(nu), np.tri(nu), self.prediction.forced])
 
     @cached_property
-    def _sparse(self) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-        return sp.csc_matrix(2.0 * self._half_hessian), sp.csc_matrix(self._matrix)
+    def _program(self) -> QP:
+        return QP.of(sp.csc_matrix(2.0 * self._half_hessian), sp.csc_matrix(self._matrix))
 
     def _constrained(
         self, miss: np.ndarray, rows: np.ndarray, lower: np.ndarray, upper: np.ndarray
     ) -> tuple[np.ndarray, Status, str]:
-        h, g = self._sparse
-        qp = QP(h, g, -2.0 * self.prediction.forced.T @ miss, lower, upper)
+        qp = self._program.with_vectors(-2.0 * self.prediction.forced.T @ miss, lower, upper)
         answer = self.backend.solve(qp)
-        if answer.z is not None and answer.y is not None:
-            worst = max(residuals(qp, answer.z, answer.y))
-            if worst <= self.options.tolerance:
-                return answer.z, Status.SOLVED, ""
+        if answer.z is not None and max(answer.residuals) <= self.options.tolerance:
+            return answer.z, Status.SOLVED, ""
         still = np.zeros(self.prediction.nu)
         nu = self.prediction.nu
         _, excess = least_violation(qp, np.arange(2 * nu, len(rows)), len(rows))

@@ -1,6 +1,8 @@
 """The figures of chapter 2: drawn, with their data, and the claims made with them."""
 
 import csv
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,13 @@ QUICK = ("2.2", "2.3", "2.4", "2.7", "2.8", "2.9")
 SLOW = tuple(figure.number for figure in FIGURES if figure.number not in QUICK)
 
 
-def drawn(number: str, out: Path) -> dict[str, np.ndarray]:
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory) -> Callable[[str], dict[str, np.ndarray]]:
+    """Draw a figure once, however many tests look at it."""
+    return cache(lambda number: draw(number, tmp_path_factory.mktemp("figures")))
+
+
+def draw(number: str, out: Path) -> dict[str, np.ndarray]:
     """Draw, check both files, and return the data as the file has it."""
     ((figure, drawing),) = draw_all(chosen([number]), out)
     picture = out / f"fig-{number}.png"
@@ -34,34 +42,34 @@ def drawn(number: str, out: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("number", QUICK)
-def test_quick_figures_are_drawn(number, tmp_path):
-    assert drawn(number, tmp_path)
+def test_quick_figures_are_drawn(number, drawn):
+    assert drawn(number)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", SLOW)
-def test_slow_figures_are_drawn(number, tmp_path):
-    assert drawn(number, tmp_path)
+def test_slow_figures_are_drawn(number, drawn):
+    assert drawn(number)
 
 
-def test_batch_and_recursion_agree(tmp_path):
+def test_batch_and_recursion_agree(drawn):
     for number in ("2.3", "2.4"):
-        data = drawn(number, tmp_path)
+        data = drawn(number)
         for name in (name for name in data if ", batch" in name):
             other = data[name.replace("batch", "recursive")]
             # Fed forward, the unstable plant amplifies rounding.
             np.testing.assert_allclose(data[name], other, atol=1e-7)
 
 
-def test_free_and_forced_responses_add_up(tmp_path):
-    data = drawn("2.7", tmp_path)
+def test_free_and_forced_responses_add_up(drawn):
+    data = drawn("2.7")
     ahead = slice(7, None)
     total = data["y, free [-]"] + data["y, forced [-]"]
     np.testing.assert_allclose(total[ahead], data["y, all [-]"][ahead], atol=1e-12)
 
 
-def test_cost_of_gpc_converges_with_the_horizon(tmp_path):
-    data = drawn("2.9", tmp_path)
+def test_cost_of_gpc_converges_with_the_horizon(drawn):
+    data = drawn("2.9")
     for name in (name for name in data if name.startswith("cost")):
         assert data[name][0] > 1.5 * data[name][-1]
         assert data[name][4] <= 1.002 * data[name][-1]
@@ -78,8 +86,8 @@ def test_constraints_hold_and_the_short_horizon_pushes_hardest():
 
 
 @pytest.mark.slow
-def test_a_smaller_interval_is_smoother_at_the_same_real_time_horizon(tmp_path):
-    data = drawn("2.13", tmp_path)
+def test_a_smaller_interval_is_smoother_at_the_same_real_time_horizon(drawn):
+    data = drawn("2.13")
     name = "u, dt = {} s, N = {} [N]".format
     coarse, same_time, same_count = (data[name(*a)] for a in ((0.05, 5), (0.01, 25), (0.01, 5)))
     late = coarse[10:], same_time[50:], same_count[50:]

@@ -1,4 +1,4 @@
-"""Batch, Riccati, LinearMPC and MultipleShooting: one description, one answer."""
+"""Batch, Riccati, LinearMPC, MultipleShooting and GridDP: one description, one answer."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from models import lq_regulator, stable_plant, thesis_regulator, unstable_plant
+from models import lq_regulator, mass_spring_damper, stable_plant, thesis_regulator, unstable_plant
 from ocp import (
     OCP,
     Box,
@@ -19,7 +19,7 @@ from ocp import (
     solve,
     with_stationary_end,
 )
-from solvers import Batch, LinearMPC, MultipleShooting, Riccati
+from solvers import Axis, Batch, GridDP, LinearMPC, MultipleShooting, Riccati
 from tests import tolerances
 from tests.linear.problems import general, unstable_tracking
 
@@ -87,6 +87,34 @@ def test_all_solvers_agree_on_the_same_problem(solver, ocp):
     assert verdict.cost == pytest.approx(reference.cost, rel=1e-8)
     assert verdict.violation == 0.0
     assert verdict.stationarity < 1e-4 * scale  # IPOPT's error times 1.35^20
+
+
+GRID = GridDP(
+    states=(Axis(-0.5, 1.5, 121), Axis(-3.0, 1.5, 121)), controls=(Axis(-16.0, 16.0, 65),)
+)
+
+
+@pytest.mark.parametrize("solver", [*SOLVERS, GRID], ids=lambda s: type(s).__name__)
+def test_one_description_five_solvers(solver):
+    """The plant 2.92; what a table is allowed is its own estimate of its error."""
+    weight = 0.5
+    ocp = lq_regulator(
+        mass_spring_damper().sampled(0.05),
+        Q=[100.0, 10.0],
+        R=weight,
+        P=100.0,
+        x0=[1.0, 0.0],
+        horizon=20,
+    )
+    solution, optimum = solve(ocp, solver), solve(ocp, Riccati())
+    assert solution.status is Status.SOLVED
+    verdict = evaluate(solution)
+    allowed = solution.residual if solver is GRID else 1e-8 * optimum.cost
+    assert allowed <= 0.01 * optimum.cost
+    assert 0.0 <= verdict.cost - optimum.cost + 1e-9 * optimum.cost <= allowed
+    assert solution.cost == pytest.approx(verdict.cost, rel=1e-9)
+    # The cost rises by at least R du^2 from its minimum.
+    np.testing.assert_allclose(solution.u, optimum.u, atol=np.sqrt(allowed / weight))
 
 
 @pytest.mark.parametrize("ocp", PROBLEMS, ids=lambda p: p.name)

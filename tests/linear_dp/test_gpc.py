@@ -281,6 +281,8 @@ def test_bad_polynomials(bad):
         {"tolerance": 0.0},
         {"weight": -1.0},
         {"weight": np.inf},
+        {"weight": "a"},
+        {"tolerance": "tight"},
         {"input_bounds": Box(1.0, 0.0)},
         {"backend": "abacus"},
     ],

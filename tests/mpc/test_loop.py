@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,7 +136,7 @@ def test_the_cost_is_that_of_the_plants_own_trajectory() -> None:
     ocp = cart()
     plan = solve(ocp, MultipleShooting(10))
     law = Law(law=lambda x, t: plan.control(t + 1e-9))
-    rollout = closed_loop(law, Plant(ocp=ocp, subdt=0.05), START, 1.0, dt=DT)
+    rollout = closed_loop(law, Plant(ocp=ocp, substeps=20), START, 1.0, dt=DT)
     end = float(ocp.functions.terminal_cost(rollout.x[-1], 1.0, []))
     assert rollout.cost + end == pytest.approx(plan.cost, rel=1e-5)
 
@@ -238,7 +239,13 @@ def test_what_does_not_fit_is_said() -> None:
     arm = MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, applied=Applied("rate"))
     with pytest.raises(ProblemError, match="sends 2 inputs, the plant 'cart' takes 1"):
         arm.run(Plant(ocp=cart()), START, 0.5)
-    for bad in ({"lag": -1.0}, {"jitter": 1.0}, {"substeps": 0}, {"measurement_noise": [1, 2, 3]}):
+    bad_plants: tuple[dict[str, Any], ...] = (
+        {"lag": -1.0},
+        {"jitter": 1.0},
+        {"substeps": 0},
+        {"measurement_noise": [1, 2, 3]},
+    )
+    for bad in bad_plants:
         with pytest.raises(ProblemError, match="plant"):
             Plant(ocp=cart(), **bad)
     with pytest.raises(ProblemError, match=r"dt = 0\.1 s, but the model's step"):
