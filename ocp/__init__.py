@@ -15,6 +15,14 @@ from ocp.linear.stationary import Stationary, stationary, with_stationary_end
 from ocp.linear.structure import linear_quadratic
 from ocp.linear.terminal_set import Polyhedron, terminal_set, with_terminal_set
 from ocp.model import Model
+from ocp.mpc.applied import Applied
+from ocp.mpc.decision import Controller, ControlRefused, Decision, Outcome
+from ocp.mpc.driver import MPC
+from ocp.mpc.law import Law
+from ocp.mpc.loop import closed_loop
+from ocp.mpc.plant import Plant
+from ocp.mpc.recorder import FlightRecorder, Record, Replay, records, replay
+from ocp.mpc.rollout import Rollout
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
 from ocp.problem import OCP, FreeTime
@@ -25,30 +33,42 @@ from ocp.status import Status
 from ocp.transcription import Row, Transcription
 
 __all__ = [
+    "MPC",
     "OCP",
     "RK4",
+    "Applied",
     "Box",
     "Constraint",
+    "ControlRefused",
+    "Controller",
     "Data",
+    "Decision",
     "Euler",
     "Evaluation",
+    "FlightRecorder",
     "FreeTime",
     "Functions",
     "Guess",
     "Hamiltonian",
     "Integrator",
     "LQData",
+    "Law",
     "LinearQuadratic",
     "Matrices",
     "Midpoint",
     "Model",
     "OCPError",
     "Optimality",
+    "Outcome",
     "Parameter",
     "ParameterValues",
+    "Plant",
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Record",
+    "Replay",
+    "Rollout",
     "Row",
     "Signal",
     "Solution",
@@ -61,6 +81,7 @@ __all__ = [
     "Transcription",
     "UnsupportedProblem",
     "Work",
+    "closed_loop",
     "costates_along",
     "derive",
     "discretise",
@@ -69,6 +90,8 @@ __all__ = [
     "instance",
     "interpolate",
     "linear_quadratic",
+    "records",
+    "replay",
     "solve",
     "stationary",
     "symbol_kind",

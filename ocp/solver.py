@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from time import perf_counter
+from typing import ClassVar
 
 from numpy.typing import ArrayLike
 
@@ -14,7 +15,13 @@ Start = Guess | Solution
 
 
 class Program(ABC):
-    """A problem prepared by a solver: all symbolic work is done."""
+    """A problem prepared by a solver: all symbolic work is done.
+
+    Attributes:
+        remembers: whether an answer depends on the runs before it, other than by the guess.
+    """
+
+    remembers: ClassVar[bool] = False
 
     @abstractmethod
     def run(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -125,6 +125,7 @@ class LinearMPCProgram(Program):
     backend: Backend
     softening: Softening | None
     _workspace: _Workspace = field(default_factory=_Workspace)
+    remembers: ClassVar[bool] = True
 
     def prepare(self, matrices: Matrices) -> None:
         """Take other matrices; nothing happens if they are the last ones."""

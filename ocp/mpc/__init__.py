@@ -1,0 +1,1 @@
+"""The receding-horizon driver: plan, check, apply, measure; never an input nobody answers for."""

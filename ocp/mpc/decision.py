@@ -1,0 +1,86 @@
+"""What a controller decides at one instant, and what stands behind it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from ocp.errors import OCPError
+from ocp.solution import Solution
+from ocp.status import Status
+
+
+class Outcome(Enum):
+    """Which rung of the ladder the input comes from, best first."""
+
+    OPTIMAL = "the first control of a plan that meets the optimality conditions"
+    FEASIBLE = "the first control of a new plan that meets the constraints, but is not optimal"
+    SHIFTED = "the next control of an earlier plan whose remainder still meets the constraints"
+    BACKUP = "the backup law's, since no plan can be used"
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether the plan was made for this very instant."""
+        return self in (Outcome.OPTIMAL, Outcome.FEASIBLE)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Decision:
+    """An input that may be applied: finite, within its bounds, and named for what it is.
+
+    Attributes:
+        t: when the state was measured [s].
+        applies_at: from when on the input is meant to act [s].
+        input: what the plant receives (m,).
+        outcome: which rung it comes from.
+        status: how the solver ended at this step; None where it was not asked or raised.
+        message: why the outcome is not ``OPTIMAL``, in words.
+        plan: the plan that the input comes from; None for the backup law.
+        residual: the solver's optimality residual; inf without a plan of this step.
+        age: steps since that plan was made, 0 for a new one.
+        late: whether a new plan came too late for this step.
+        parameters: of the horizon, by name.
+        clipped: by how much the input was moved to lie within its bounds.
+        time_used: of this step [s].
+    """
+
+    t: float
+    applies_at: float
+    input: np.ndarray
+    outcome: Outcome
+    status: Status | None = None
+    message: str = ""
+    plan: Solution | None = None
+    residual: float = np.inf
+    age: int = 0
+    late: bool = False
+    parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    clipped: float = 0.0
+    time_used: float = 0.0
+
+
+class ControlRefused(OCPError, RuntimeError):
+    """No input can be answered for: there is no usable plan, and no backup law that helps."""
+
+
+class Controller(Protocol):
+    """Anything that decides an input from a measurement: ``MPC``, ``Law``."""
+
+    @property
+    def delay(self) -> float:
+        """Time from measurement to effect [s], a multiple of the sampling interval."""
+        ...
+
+    def reset(self) -> None:
+        """Forget everything about earlier steps."""
+        ...
+
+    def step(self, x: np.ndarray, t: float) -> Decision:
+        """Decide for a state x (nx,) measured at t [s].
+
+        Raises:
+            ControlRefused: if no input can be answered for.
+        """
+        ...

@@ -1,0 +1,204 @@
+"""Receding-horizon control (Algorithm 3): a controller around any solver."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.errors import ProblemError
+from ocp.mpc.applied import Applied
+from ocp.mpc.decision import ControlRefused, Decision
+from ocp.mpc.delay import late_steps
+from ocp.mpc.ladder import Backup, Ladder, Moment
+from ocp.mpc.loop import Watch, closed_loop
+from ocp.mpc.memory import Memory
+from ocp.mpc.plant import Plant
+from ocp.mpc.rollout import Rollout
+from ocp.problem import OCP
+from ocp.solver import Solver, Start
+
+Parameters = Callable[[float], Mapping[str, ArrayLike]]
+
+
+@dataclass(eq=False, kw_only=True)
+class MPC:
+    """A receding-horizon controller around any solver, for a problem that moves with time.
+
+    At every step the problem is solved from the measured state, warm started by the last plan
+    shifted to now (states, controls and costates), and its first control applied. An input is
+    always finite and within its bounds. Where the new plan cannot be used, the next rung of
+    this ladder is taken, and the decision says so:
+
+    1. the new plan, ``OPTIMAL``, or ``FEASIBLE`` where the solver stopped early: then the
+       model is run under its controls, and it must meet the constraints;
+    2. the remainder of the last good plan, ``SHIFTED``, run on the model from the measured
+       state: it must meet the constraints;
+    3. the ``backup`` law, ``BACKUP``;
+    4. ``ControlRefused``.
+
+    An answer that took longer than ``budget`` came too late for its step: it is not applied
+    but remembered, and the next rungs see it as the last plan. Source: thesis Algorithm 3,
+    2.2.1; [Mayne et al. 2000].
+
+    Args:
+        ocp: the problem over one horizon. Its t is absolute time: t0 enters at every step.
+        solver: any solver.
+        dt: sampling interval [s]; need not divide the horizon, since a shifted plan is
+            interpolated. For a discrete-time model it is that model's step. The input is held
+            for dt: plans whose controls are held for less are applied only in their first part.
+        applied: what the plant receives.
+        backup: (x, t) -> input (m,); default: hold the last input.
+        parameters: t -> parameters and signals of the horizon that starts there.
+        guess: where the first step starts; a ``Solution`` of any solver. Indirect shooting
+            needs a good one: from its own it may converge to a spurious extremal and stay there.
+        delay: time from measurement to effect [s], a multiple of dt.
+        compensate: whether the state is predicted over the delay, with the inputs that are
+            already on their way; if not, the plan starts from the measured state.
+        budget: time for a step [s]; None: unlimited.
+        tolerance: by how much an input may leave its bounds, or a plan the constraints, before
+            that is a failure; an input that leaves them by less is clipped, and it is recorded.
+
+    Raises:
+        ProblemError: if interval, delay, budget or bounds do not fit the problem.
+        UnsupportedProblem: if the solver cannot treat it.
+    """
+
+    ocp: OCP
+    solver: Solver
+    dt: float
+    applied: Applied = field(default_factory=Applied)
+    backup: Backup | None = None
+    parameters: Parameters | None = None
+    guess: Start | None = None
+    delay: float = 0.0
+    compensate: bool = True
+    budget: float | None = None
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        """Check the numbers, and do all symbolic work."""
+        self._check()
+        self.steps_late = late_steps(self.delay, self.dt)
+        self.memory = Memory()
+        self._ladder = Ladder(
+            ocp=self.ocp,
+            program=self.solver.build(self.ocp),
+            applied=self.applied,
+            backup=self.backup,
+            guess=self.guess,
+            dt=self.dt,
+            tolerance=self.tolerance,
+        )
+
+    def _check(self) -> None:
+        name, model, dt = self.ocp.name, self.ocp.model, self.dt
+        if not 0.0 < dt < np.inf:
+            raise ProblemError(f"MPC of {name}: dt = {dt} s, it must be positive, finite")
+        if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
+            raise ProblemError(f"MPC of {name}: dt = {dt} s, but the model's step is {model.dt} s")
+        if dt > self.ocp.duration * (1.0 + 1e-9):
+            raise ProblemError(
+                f"MPC of {name}: dt = {dt} s is longer than the horizon of {self.ocp.duration} s"
+            )
+        if self.budget is not None and not self.budget > 0.0:
+            raise ProblemError(f"MPC of {name}: budget = {self.budget} s, it must be positive")
+        if not self.tolerance >= 0.0:
+            raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the solver's own answers depend on the runs before."""
+        return self._ladder.program.remembers
+
+    def twin(self) -> "MPC":
+        """Return a controller like this one that knows nothing yet."""
+        return replace(self)
+
+    def reset(self) -> None:
+        """Forget the last plan and input."""
+        self.memory = Memory()
+
+    def step(
+        self,
+        x: ArrayLike,
+        t: float,
+        *,
+        late: bool | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Decision:
+        """Decide.
+
+        Args:
+            x: measured state (nx,); NaN is a missing measurement.
+            t: when it was measured [s].
+            late: whether the answer counts as late; default: by the clock.
+            parameters: of the horizon that starts when the input acts; default: what the
+                controller's own ``parameters`` say.
+
+        Raises:
+            ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
+            ControlRefused: if no rung holds.
+        """
+        started = perf_counter()
+        if parameters is None and self.parameters is not None:
+            parameters = self.parameters(t + self.delay)
+        moment = self._moment(x, float(t), parameters)
+        ladder = self._ladder
+        plan, status = ladder.solve(moment)
+        used = perf_counter() - started
+        if late is None:
+            late = self.budget is not None and used > self.budget
+        late = late and plan is not None
+        if late:
+            moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
+        new = ladder.new(moment, plan) if plan is not None and not late else None
+        decision = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
+        if decision is None:
+            raise ControlRefused(f"t = {t:g} s: {'; '.join(moment.reasons)}")
+        good = plan if late or new is not None else None
+        self.memory = self.memory.after(decision.input, good, self.steps_late)
+        return replace(
+            decision,
+            status=status,
+            message="; ".join(moment.reasons),
+            residual=plan.residual if plan else np.inf,
+            late=late,
+            time_used=perf_counter() - started,
+        )
+
+    def run(
+        self,
+        plant: Plant,
+        x0: ArrayLike,
+        duration: float,
+        *,
+        seed: int = 0,
+        watch: Watch | None = None,
+    ) -> Rollout:
+        """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval."""
+        return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+
+    def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
+        """Collect what a decision is made from."""
+        nx, plan = self.ocp.model.nx, self.memory.plan
+        state = np.array(x, dtype=float)
+        if state.shape != (nx,) or not np.isfinite(t):
+            raise ProblemError(
+                f"MPC of {self.ocp.name}: x has shape {state.shape} at t = {t}; "
+                f"({nx},) and a finite time are needed"
+            )
+        values = self.ocp.parameter_values(parameters)
+        is_measured, at = bool(np.isfinite(state).all()), t + self.delay
+        if not is_measured:
+            state = self.ocp.start() if plan is None else plan.state(at)
+        elif self.compensate:
+            state = self._predicted(state, t, values.at(0.0)[0])
+        return Moment(t=t, at=at, start=state, is_measured=is_measured, plan=plan, values=values)
+
+    def _predicted(self, x: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
+        """Return the state after the delay, under the inputs that are on their way."""
+        for k, given in enumerate(self.memory.pending):
+            x = self._ladder.advanced(x, given, t + k * self.dt, p)
+        return x

@@ -1,0 +1,214 @@
+"""From a measurement to an input that somebody answers for: the rungs, best first."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.constraint import Box
+from ocp.errors import OCPError
+from ocp.mpc.applied import Applied
+from ocp.mpc.decision import Decision, Outcome
+from ocp.mpc.rehearsal import Ends, Rehearsal
+from ocp.mpc.shift import controls, shifted
+from ocp.parameters import ParameterValues
+from ocp.problem import OCP
+from ocp.solution import Solution
+from ocp.solver import Program, Start
+from ocp.status import Status
+
+Backup = Callable[[np.ndarray, float], ArrayLike]
+
+# Whatever a solver may raise for numbers that it did not expect; a TypeError is a bug, and stays.
+_INSIDE = (OCPError, ArithmeticError, ValueError, RuntimeError, LookupError, MemoryError)
+# Not converged, but with a trajectory that may be worth applying.
+_USABLE = frozenset(
+    {
+        Status.MYOPIC,
+        Status.SMALL_DECREASE,
+        Status.COST_ROSE,
+        Status.ITERATION_LIMIT,
+        Status.NO_PROGRESS,
+    }
+)
+# Of an instant, relative to the interval: later than the end by less is the end.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Moment:
+    """What a decision is made from.
+
+    Attributes:
+        t: when the state was measured [s].
+        at: when the input acts [s].
+        start: the state then (nx,), predicted where need be.
+        is_measured: False where the measurement is missing and the last plan stands in.
+        plan: the last good one.
+        values: parameters and signals of the horizon from ``at`` on.
+        reasons: why the rungs above do not hold, in words; grows on the way down.
+    """
+
+    t: float
+    at: float
+    start: np.ndarray
+    is_measured: bool
+    plan: Solution | None
+    values: ParameterValues
+    reasons: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ladder:
+    """The rungs of one controller; each returns a decision, or None and a reason.
+
+    Attributes:
+        ocp: the problem.
+        program: solves it.
+        applied: what the plant receives.
+        guess: where the first step starts.
+        backup: the law of the last rung; None: hold the last input.
+        dt: sampling interval [s].
+        tolerance: what still counts as inside.
+    """
+
+    ocp: OCP
+    program: Program
+    applied: Applied
+    guess: Start | None
+    backup: Backup | None
+    dt: float
+    tolerance: float
+    _rehearsals: dict[int, Rehearsal] = field(default_factory=dict)
+
+    def solve(self, moment: Moment) -> tuple[Solution | None, Status | None]:
+        """Return a new plan that meets the constraints, and how the solver ended."""
+        if not moment.is_measured:
+            moment.reasons.append("the measurement is not finite")
+            return None, None
+        last = moment.plan
+        try:
+            plan = self.program.run(
+                x0=moment.start,
+                t0=moment.at,
+                parameters=moment.values.as_dict(),
+                guess=shifted(last, moment.at) if last else self.guess,
+            )
+        except _INSIDE as error:
+            moment.reasons.append(f"{type(error).__name__} inside the solver: {error}")
+            return None, None
+        excess, worst = self._excess(plan, moment)
+        if excess > self.tolerance:
+            moment.reasons.append(f"{plan.status.name}: {plan.message or worst}")
+            return None, plan.status
+        if plan.status is not Status.SOLVED:
+            moment.reasons.append(f"{plan.status.name}: {plan.message or plan.status.value}")
+        return plan, plan.status
+
+    def new(self, moment: Moment, plan: Solution) -> Decision | None:
+        """Follow the new plan."""
+        outcome = Outcome.OPTIMAL if plan.status is Status.SOLVED else Outcome.FEASIBLE
+        return self._following(plan, moment, outcome)
+
+    def shifted(self, moment: Moment) -> Decision | None:
+        """Follow the last good plan, if its remainder meets the constraints."""
+        if moment.plan is None:
+            moment.reasons.append("there is no earlier plan")
+            return None
+        excess, worst = self._rehearsed(moment.plan, moment)
+        if excess > self.tolerance:
+            moment.reasons.append(f"the earlier plan: {worst}")
+            return None
+        return self._following(moment.plan, moment, Outcome.SHIFTED)
+
+    def backed_up(self, moment: Moment, last: np.ndarray | None) -> Decision | None:
+        """Ask the backup law; without one hold the last input."""
+        given = last
+        if self.backup is not None:
+            try:
+                given = np.array(self.backup(moment.start, moment.at), dtype=float).reshape(-1)
+            except _INSIDE as error:
+                moment.reasons.append(f"{type(error).__name__} inside the backup law: {error}")
+                return None
+        if given is None:
+            moment.reasons.append("there is no input to hold, and no backup law")
+            return None
+        if given.shape != np.shape(self.box.lower) or not np.isfinite(given).all():
+            moment.reasons.append(f"the backup law returned {given}")
+            return None
+        return self._decision(moment, given, Outcome.BACKUP, np.inf)
+
+    def advanced(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
+        """Return the model's state one interval after t [s] under an input, parameters held."""
+        if self.applied.what == "rate":
+            return x + self.dt * given
+        times, ends = np.array([t, t + self.dt]), (p[None, :], p[None, :])
+        return self._rehearsal(1).of(x, given[None, :], times, ends).x[-1]
+
+    # -- pieces -------------------------------------------------------------------------------
+
+    def _excess(self, plan: Solution, moment: Moment) -> tuple[float, str]:
+        """Return by how much a new plan violates the constraints; inf where it is none."""
+        if plan.status.is_success:
+            u, ends = controls(plan, plan.t[:-1]), self._ends(moment, plan.t)
+            return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
+        if plan.status in _USABLE:
+            return self._rehearsed(plan, moment)
+        return np.inf, plan.status.value
+
+    def _rehearsed(self, plan: Solution, moment: Moment) -> tuple[float, str]:
+        """Run the model from now under what is left of a plan, and check the constraints."""
+        times = moment.at + plan.t - plan.t[0]
+        left = int((times[:-1] < plan.t[-1] - _ROUNDING * self.dt).sum())
+        if not left:
+            return np.inf, "nothing is left of it"
+        times = times[: left + 1]
+        u = controls(plan, times[:-1])
+        trial = self._rehearsal(left).of(moment.start, u, times, self._ends(moment, times))
+        return trial.excess, trial.worst
+
+    def _following(self, plan: Solution, moment: Moment, outcome: Outcome) -> Decision | None:
+        """Return the decision to follow a plan now; None where its input is none."""
+        # A control that moves is held at its value in the middle of the interval, its mean but
+        # for second-order terms.
+        middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
+        u = controls(plan, np.array([moment.at + middle]))[0]
+        given = self.applied.of(self.ocp, moment.start, u, moment.at, moment.values.at(0.0)[0])
+        decision = self._decision(moment, given, outcome, self.tolerance)
+        if decision is None:
+            return None
+        return replace(decision, plan=plan, age=round((moment.at - plan.t[0]) / self.dt))
+
+    def _decision(
+        self, moment: Moment, given: np.ndarray, outcome: Outcome, most: float
+    ) -> Decision | None:
+        """Return a decision, its input clipped; None if it is not finite or clipped by more."""
+        excess = float(self.box.excess(given).max(initial=0.0))
+        if not np.isfinite(given).all() or excess > most:
+            moment.reasons.append(f"the input {given} leaves its bounds by {excess:.3g}")
+            return None
+        return Decision(
+            t=moment.t,
+            applies_at=moment.at,
+            input=self.box.clip(given),
+            outcome=outcome,
+            parameters=moment.values.as_dict(),
+            clipped=excess,
+        )
+
+    def _ends(self, moment: Moment, times: np.ndarray) -> Ends:
+        """Return the parameters at both ends of the intervals between some instants (N + 1,)."""
+        return moment.values.on((times - moment.at) / self.ocp.duration)
+
+    def _rehearsal(self, n: int) -> Rehearsal:
+        """Roll-outs over n intervals, prepared once for each n."""
+        if n not in self._rehearsals:
+            self._rehearsals[n] = Rehearsal(self.ocp, n)
+        return self._rehearsals[n]
+
+    @cached_property
+    def box(self) -> Box:
+        """Bounds of the input, each (m,)."""
+        return self.applied.box(self.ocp)

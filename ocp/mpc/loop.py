@@ -1,0 +1,153 @@
+"""The loop: measure, decide, apply, and write down."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.constraint import Constraint
+from ocp.errors import ProblemError
+from ocp.mpc.decision import Controller, ControlRefused, Decision
+from ocp.mpc.delay import late_steps
+from ocp.mpc.plant import Plant, RunningPlant
+from ocp.mpc.rollout import Rollout
+from ocp.problem import OCP
+
+Fault = Callable[[np.ndarray, float], np.ndarray]
+Watch = Callable[[np.ndarray, Decision], None]
+
+
+def closed_loop(
+    controller: Controller,
+    plant: Plant,
+    x0: ArrayLike,
+    duration: float,
+    *,
+    dt: float,
+    seed: int = 0,
+    initial_input: ArrayLike | None = None,
+    sensors: Fault | None = None,
+    watch: Watch | None = None,
+) -> Rollout:
+    """Run a controller on a plant.
+
+    The input decided from the measurement at t acts from t + ``controller.delay`` on, until
+    then the initial one. Where the controller refuses, the rollout ends and says why.
+
+    Args:
+        controller: ``MPC``, ``Law``, or whatever decides.
+        plant: the truth.
+        x0: true first state (nx,).
+        duration: [s], a multiple of dt up to rounding.
+        dt: sampling interval [s].
+        seed: of noise and jitter.
+        initial_input: acts during the delay at the start (m,); default: zero, within bounds.
+        sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
+        watch: called with every measurement and decision, such as a ``FlightRecorder``.
+
+    Raises:
+        ProblemError: if the plant takes another input than the controller sends, or the
+            duration is no multiple of dt.
+    """
+    steps = round(duration / dt)
+    if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
+        raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
+    controller.reset()
+    journal = _Journal(plant.ocp, plant.started(x0, seed))
+    box, m = plant.ocp.control_bounds, plant.ocp.model.nu
+    first = box.clip(np.zeros(m)) if initial_input is None else np.array(initial_input, float)
+    ahead = [first] * late_steps(controller.delay, dt)
+    for _ in range(steps):
+        measured = journal.running.measure()
+        told = sensors(measured, journal.running.t) if sensors else measured
+        try:
+            decision = controller.step(told, journal.running.t)
+        except ControlRefused as refusal:
+            journal.ended = str(refusal)
+            break
+        if decision.input.shape != (m,):
+            raise ProblemError(
+                f"closed loop: the controller sends {decision.input.size} inputs, "
+                f"the plant '{plant.ocp.name}' takes {m}"
+            )
+        if watch:
+            watch(told, decision)
+        ahead.append(decision.input)
+        journal.advance(told, decision, ahead.pop(0), dt)
+        if not np.isfinite(journal.running.x).all():
+            journal.ended = "the plant's state blows up"
+            break
+    return journal.rollout()
+
+
+@dataclass(eq=False)
+class _Journal:
+    """A rollout while it is made."""
+
+    ocp: OCP
+    running: RunningPlant
+    t: list[float] = field(default_factory=list)
+    x: list[np.ndarray] = field(default_factory=list)
+    measured: list[np.ndarray] = field(default_factory=list)
+    inputs: list[np.ndarray] = field(default_factory=list)
+    decisions: list[Decision] = field(default_factory=list)
+    costs: list[float] = field(default_factory=list)
+    violation: float = 0.0
+    worst: str = ""
+    ended: str = ""
+
+    def __post_init__(self) -> None:
+        self.t.append(self.running.t)
+        self.x.append(self.running.x)
+
+    def advance(self, told: np.ndarray, decision: Decision, acting: np.ndarray, dt: float) -> None:
+        """Let an input act for an interval, and write everything down."""
+        cost, excess, worst = self.running.advance(acting, dt)
+        if excess > self.violation:
+            self.violation, self.worst = excess, f"{worst} before t = {self.running.t:.4g} s"
+        self.measured.append(told)
+        self.inputs.append(acting)
+        self.decisions.append(decision)
+        self.costs.append(cost)
+        self.t.append(self.running.t)
+        self.x.append(self.running.x)
+
+    def rollout(self) -> Rollout:
+        """Return it."""
+        t, x = np.array(self.t), np.array(self.x)
+        m = self.ocp.model
+        return Rollout(
+            plant=self.ocp,
+            t=t,
+            x=x,
+            measured=np.array(self.measured).reshape(-1, m.nx),
+            inputs=np.array(self.inputs).reshape(-1, m.nu),
+            outcomes=tuple(d.outcome for d in self.decisions),
+            messages=tuple(d.message for d in self.decisions),
+            costs=np.array(self.costs),
+            violation=self.violation,
+            worst=self.worst,
+            drift=_drift(self.ocp, t, x),
+            step_times=np.array([d.time_used for d in self.decisions]),
+            clipped=np.array([d.clipped for d in self.decisions]),
+            ended=self.ended,
+            decisions=tuple(self.decisions),
+        )
+
+
+def _drift(ocp: OCP, t: np.ndarray, x: np.ndarray) -> float:
+    """Largest violation of the invariants; their parameters are the declared ones."""
+    if not ocp.invariants:
+        return 0.0
+    p = ocp.parameter_values().at(0.0)[0]
+    rows = np.array([ocp.functions.invariants(*row, p) for row in zip(x, t, strict=True)])
+    return _excess(ocp.invariants, rows.reshape(len(t), -1))
+
+
+def _excess(constraints: tuple[Constraint, ...], rows: np.ndarray) -> float:
+    first, worst = 0, 0.0
+    for c in constraints:
+        worst = max(worst, float(c.box.excess(rows[:, first : first + c.size]).max(initial=0.0)))
+        first += c.size
+    return worst

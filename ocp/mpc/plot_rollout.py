@@ -1,0 +1,55 @@
+"""What people look at after a closed loop."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ocp.mpc.decision import Outcome
+from ocp.mpc.rollout import Rollout
+
+_COLOURS = {
+    Outcome.OPTIMAL: "#2f7fb8",
+    Outcome.FEASIBLE: "#3aa98f",
+    Outcome.SHIFTED: "#e8710a",
+    Outcome.BACKUP: "tab:red",
+}
+
+
+def plot_rollout(rollout: Rollout) -> Figure:
+    """Return states, inputs and running cost over time; the shade says where an input is from."""
+    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+    states, inputs, costs = figure.subplots(3, 1, sharex=True)
+    model = rollout.plant.model
+    for name, column in zip(_labels(model.x_names, model.x_units), rollout.x.T, strict=True):
+        states.plot(rollout.t, column, label=name)
+    edges = rollout.t[: len(rollout.inputs) + 1]
+    for name, column in zip(_labels(model.u_names, model.u_units), rollout.inputs.T, strict=True):
+        inputs.step(edges, np.append(column, column[-1:]), where="post", label=name)
+    costs.step(edges[:-1], rollout.costs / np.diff(edges), where="post", color="black")
+    for axes, label in ((states, "states"), (inputs, "inputs"), (costs, "running cost")):
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+        _shade(axes, rollout)
+    for axes in (states, inputs):
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    costs.set_xlabel("time [s]")
+    said = ", ".join(f"{n} {o.name.lower()}" for o, n in rollout.counts.items() if n)
+    worst = f"; {rollout.worst}" if rollout.worst else ""
+    figure.suptitle(
+        f"{rollout.plant.name}: closed-loop cost {rollout.cost:.6g}{worst}\n"
+        f"decisions: {said}{'; ended: ' + rollout.ended if rollout.ended else ''}",
+        fontsize=10,
+    )
+    return figure
+
+
+def _labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"{n} [{u}]" for n, u in zip(names, units, strict=True)) if units else names
+
+
+def _shade(axes: Axes, rollout: Rollout) -> None:
+    """Colour the background where the input is not that of an optimal plan."""
+    for k, outcome in enumerate(rollout.outcomes):
+        if outcome is not Outcome.OPTIMAL:
+            left, right = rollout.t[k], rollout.t[k + 1]
+            axes.axvspan(left, right, color=_COLOURS[outcome], alpha=0.25, lw=0)

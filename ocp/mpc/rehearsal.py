@@ -1,0 +1,99 @@
+"""Controls tried on the model before anybody applies them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ocp.constraint import Box
+from ocp.integrate import RK4, Stage
+from ocp.problem import OCP
+from ocp.referee.violation import stacked_box
+
+# Parameters at the left and at the right end of each interval, (N, n_p) each.
+Ends = tuple[np.ndarray, np.ndarray]
+
+
+class Trial(NamedTuple):
+    """What the model does under given controls.
+
+    Attributes:
+        x: states (N + 1, nx).
+        cost: integrated running cost.
+        excess: largest violation of a bound or path constraint from the first step on; inf
+            where the state blows up.
+        worst: what is violated most.
+    """
+
+    x: np.ndarray
+    cost: float
+    excess: float
+    worst: str
+
+
+@dataclass(frozen=True, eq=False)
+class Rehearsal:
+    """Roll-outs of a problem over N intervals, and the check of its constraints.
+
+    The state at the first node is measured: nothing can be done about it, so only what
+    depends on the control is checked there.
+
+    Attributes:
+        ocp: the problem.
+        n: number of intervals.
+    """
+
+    ocp: OCP
+    n: int
+
+    def of(self, x0: np.ndarray, u: np.ndarray, t: np.ndarray, p: Ends) -> Trial:
+        """Roll controls u (N, nu), held between the instants t (N + 1,), out from x0 (nx,).
+
+        The parameters are those at the left and at the right end of each interval.
+        """
+        left, right = p
+        inputs = (u.T, t[None, :-1], np.diff(t)[None, :], left.T, right.T)
+        x, cost = self._rollout(x0, *inputs)
+        states = np.vstack([x0, np.array(x).T])
+        if not np.isfinite(states).all():
+            return Trial(np.tile(x0, (self.n + 1, 1)), np.inf, np.inf, "the state blows up")
+        return Trial(states, float(np.sum(np.array(cost))), *self.excess(states, u, t, p))
+
+    def excess(self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: Ends) -> tuple[float, str]:
+        """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
+        ocp, m = self.ocp, self.ocp.model
+        found = [(0.0, "")]
+        if ocp.state_bounds.is_active:
+            found.append(_largest("state", m.x_names, ocp.state_bounds.excess(x[1:])))
+        if ocp.control_bounds.is_active:
+            found.append(_largest("control", m.u_names, ocp.control_bounds.excess(u)))
+        if self._path_names:
+            nodes = np.vstack([p[0], p[1][-1:]])
+            rows = np.array(self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)).T
+            excess = self._path_box.excess(rows)
+            excess[0, ~ocp.functions.path_on_control] = 0.0
+            found.append(_largest("constraint", self._path_names, excess))
+        return max(found)
+
+    @cached_property
+    def _rollout(self) -> ca.Function:
+        return Stage.of(self.ocp, RK4(), held=True).step.mapaccum(self.n)
+
+    @cached_property
+    def _path(self) -> ca.Function:
+        return self.ocp.functions.path.map(self.n + 1)
+
+    @cached_property
+    def _path_names(self) -> tuple[str, ...]:
+        return tuple(c.name for c in self.ocp.at("path") for _ in range(c.size))
+
+    @cached_property
+    def _path_box(self) -> Box:
+        return stacked_box(self.ocp.at("path"))
+
+
+def _largest(kind: str, names: tuple[str, ...], excess: np.ndarray) -> tuple[float, str]:
+    k, i = np.unravel_index(int(excess.argmax()), excess.shape)
+    return float(excess[k, i]), f"{kind} {names[i]} is violated by {excess[k, i]:.3g}"

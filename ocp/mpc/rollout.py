@@ -1,0 +1,122 @@
+"""What happened in a closed loop."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+from zipfile import BadZipFile
+
+import numpy as np
+
+from ocp.errors import ProblemError, SolverError
+from ocp.mpc.decision import Decision, Outcome
+from ocp.problem import OCP
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_OUTCOMES = tuple(Outcome)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rollout:
+    """A closed loop of K steps, as the plant saw it.
+
+    Attributes:
+        plant: the problem that the plant is: its cost and constraints judge.
+        t: sampling instants [s], (K + 1,).
+        x: true states (K + 1, nx).
+        measured: what the controller was told (K, nx).
+        inputs: what acted in each interval (K, m); under a delay it was decided earlier.
+        outcomes: which rung each decision came from (K,).
+        messages: why, where it was not the first (K,).
+        costs: the plant's running cost over each interval (K,).
+        violation: the plant's largest violation of a bound or constraint.
+        worst: which, and when; empty where nothing is violated.
+        drift: largest violation of the plant's invariants at the sampling instants, such as
+            the task error of an arm.
+        step_times: time of each decision [s], (K,).
+        clipped: by how much each input was clipped (K,).
+        ended: why the loop ended early; empty if it did not.
+        decisions: all of them, with their plans; empty where the rollout was loaded.
+    """
+
+    plant: OCP
+    t: np.ndarray
+    x: np.ndarray
+    measured: np.ndarray
+    inputs: np.ndarray
+    outcomes: tuple[Outcome, ...]
+    messages: tuple[str, ...]
+    costs: np.ndarray
+    violation: float
+    worst: str
+    drift: float
+    step_times: np.ndarray
+    clipped: np.ndarray
+    ended: str = ""
+    decisions: tuple[Decision, ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """The closed-loop cost: the plant's running cost along its own trajectory."""
+        return float(self.costs.sum())
+
+    @property
+    def counts(self) -> dict[Outcome, int]:
+        """How many decisions came from each rung."""
+        found = Counter(self.outcomes)
+        return {outcome: found[outcome] for outcome in Outcome}
+
+    def or_raise(self) -> "Rollout":
+        """Return self, or raise ``SolverError`` if the loop ended early."""
+        if self.ended:
+            raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}")
+        return self
+
+    def plot(self) -> "Figure":
+        """Return a figure of states, inputs, outcomes and cost over time."""
+        from ocp.mpc.plot_rollout import plot_rollout  # matplotlib takes a second
+
+        return plot_rollout(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
+        path = Path(path)
+        path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
+        np.savez_compressed(
+            path,
+            **{name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)},
+            outcomes=np.array([_OUTCOMES.index(o) for o in self.outcomes], dtype=int),
+            messages=np.array(self.messages, dtype=str),
+            name=self.plant.name,
+        )
+        return path
+
+    @classmethod
+    def load(cls, path: str | Path, plant: OCP) -> "Rollout":
+        """Read a rollout of ``plant`` from a file that ``save`` wrote.
+
+        Raises:
+            ProblemError: if the file belongs to another plant or is no rollout.
+        """
+        try:
+            with Path(path).open("rb") as raw, np.load(raw) as file:
+                data = {name: file[name] for name in file.files}
+            if str(data["name"]) != plant.name:
+                raise ProblemError(f"{path} is a loop with '{data['name']}', not '{plant.name}'")
+            return cls(
+                plant=plant,
+                **{name: data[name] for name in _ARRAYS},
+                **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+                outcomes=tuple(_OUTCOMES[i] for i in data["outcomes"]),
+                messages=tuple(map(str, data["messages"])),
+            )
+        except ProblemError:
+            raise
+        except (KeyError, ValueError, TypeError, IndexError, EOFError, BadZipFile) as error:
+            raise ProblemError(f"{path} is no saved rollout: {error}") from error
+
+
+_ARRAYS = ("t", "x", "measured", "inputs", "costs", "step_times", "clipped")
+_SCALARS = {"violation": float, "worst": str, "drift": float, "ended": str}

@@ -1,0 +1,36 @@
+"""An earlier plan, seen from a later instant: what is left of it, and as a first guess."""
+
+import numpy as np
+
+from ocp.guess import Guess
+from ocp.solution import Solution
+
+
+def shifted(plan: Solution, t0: float) -> Guess:
+    """Return a plan moved to start at t0 [s], as a first guess for the same horizon.
+
+    States, controls and costates are read off at the later instants. Beyond its end the plan
+    goes on as it ended: states along their last slope, controls held, costates at their final
+    value (what the transversality condition makes them anyway).
+    """
+    times = plan.t - plan.t[0] + t0
+    x = _along(times, plan.t, plan.x)
+    beyond = np.maximum(times - plan.t[-1], 0.0)[:, None]
+    x += beyond * (plan.x[-1] - plan.x[-2]) / (plan.t[-1] - plan.t[-2])
+    return Guess(x=x, u=controls(plan, times), costate=_along(times, plan.t, plan.costate))
+
+
+def controls(plan: Solution, times: np.ndarray) -> np.ndarray:
+    """Return the controls of a plan at some instants (K,) -> (K, nu), the last one held.
+
+    An extremal's are interpolated from its nodes: a guess needs no more, and the minimising
+    control would have to be solved for.
+    """
+    if plan.control_kind == "held":
+        index = np.searchsorted(plan.t, times + 1e-9 * plan.duration, side="right") - 1
+        return plan.u[np.clip(index, 0, len(plan.u) - 1)]
+    return _along(times, plan.t, plan.u)
+
+
+def _along(times: np.ndarray, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(times, nodes, column) for column in rows.T], axis=1)

@@ -1,0 +1,217 @@
+"""The driver never lies and never stops: every rung of the ladder, and the way back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ocp import MPC, Applied, Box, ControlRefused, Outcome, Plant, ProblemError, Solution, Status
+from solvers import MultipleShooting
+from tests.mpc.problems import LIMIT, Change, Scripted, cart, is_an_input
+
+DT = 0.1
+
+
+def raises(error: Exception) -> Change:
+    def change(solution: Solution) -> Solution:
+        raise error
+
+    return change
+
+
+def becomes(status: Status) -> Change:
+    return lambda solution: solution.with_(status=status, message="as the script says")
+
+
+def leaves_bounds(by: float) -> Change:
+    return lambda solution: solution.with_(u=np.full_like(solution.u, LIMIT + by))
+
+
+def controller(script: dict[float, Change] | None = None, **options) -> MPC:
+    return MPC(ocp=cart(), solver=Scripted(script or {}), dt=DT, **options)
+
+
+def loop(mpc: MPC, duration: float = 1.0):
+    return mpc.run(Plant(ocp=mpc.ocp), [1.0, 0.0], duration)
+
+
+def test_without_faults_every_decision_is_optimal_and_the_cart_arrives() -> None:
+    rollout = loop(controller(), 4.0).or_raise()
+    assert set(rollout.outcomes) == {Outcome.OPTIMAL}
+    assert not any(rollout.messages)
+    assert np.abs(rollout.x[-1]).max() < 1e-2
+    assert rollout.violation < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (raises(RuntimeError("as the script says")), "RuntimeError inside the solver"),
+        (raises(ZeroDivisionError("as the script says")), "ZeroDivisionError inside the solver"),
+        (becomes(Status.INFEASIBLE), "INFEASIBLE"),
+        (becomes(Status.DIVERGED), "DIVERGED"),
+        (leaves_bounds(1e-3), "control u"),
+    ],
+)
+def test_a_failure_takes_the_shifted_plan_and_names_itself(change: Change, word: str) -> None:
+    rollout = loop(controller({0.3: change, 0.4: change}))
+    expected = [Outcome.OPTIMAL] * 10
+    expected[3] = expected[4] = Outcome.SHIFTED
+    assert list(rollout.outcomes) == expected, "it recovers when the fault ends"
+    assert word in rollout.messages[3]
+    assert [d.age for d in rollout.decisions[2:6]] == [0, 1, 2, 0]
+    undisturbed = loop(controller())
+    # Plant and model agree, so following the old plan for two steps changes next to nothing.
+    assert rollout.cost == pytest.approx(undisturbed.cost, rel=1e-3)
+
+
+def test_a_small_excess_is_clipped_and_recorded() -> None:
+    rollout = loop(controller({0.3: leaves_bounds(1e-7)}))
+    assert rollout.outcomes[3] is Outcome.OPTIMAL
+    assert rollout.inputs[3] == LIMIT
+    assert rollout.clipped[3] == pytest.approx(1e-7)
+
+
+def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
+    good = loop(controller({0.3: becomes(Status.ITERATION_LIMIT)}))
+    assert good.outcomes[3] is Outcome.FEASIBLE
+    assert "ITERATION_LIMIT" in good.messages[3]
+
+    def too_fast(solution: Solution) -> Solution:
+        # From the start the cart would exceed its greatest speed under this.
+        u = np.full_like(solution.u, -LIMIT)
+        return solution.with_(u=u, status=Status.ITERATION_LIMIT, message="")
+
+    bad = loop(controller({0.3: too_fast}))
+    assert bad.outcomes[3] is Outcome.SHIFTED
+    assert "speed is violated" in bad.messages[3]
+
+
+def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:
+    script = {round(k * DT, 2): becomes(Status.FAILED) for k in range(2, 30)}
+    mpc = controller(script, backup=lambda x, t: [-x[0] - 2.0 * x[1]])
+    rollout = loop(mpc, 3.0)
+    assert rollout.outcomes[:2] == (Outcome.OPTIMAL,) * 2
+    assert set(rollout.outcomes[2:11]) == {Outcome.SHIFTED}
+    assert set(rollout.outcomes[11:]) == {Outcome.BACKUP}
+    assert "nothing is left of it" in rollout.messages[-1]
+    assert np.abs(rollout.x[-1]).max() < 0.2
+
+
+def test_without_a_backup_law_the_last_input_is_held() -> None:
+    script = {round(k * DT, 2): becomes(Status.FAILED) for k in range(2, 30)}
+    rollout = loop(controller(script), 1.5)
+    assert set(rollout.outcomes[11:]) == {Outcome.BACKUP}
+    assert (rollout.inputs[11:] == rollout.inputs[10]).all()
+
+
+@pytest.mark.parametrize("law", [None, lambda x, t: [np.nan], lambda x, t: [1.0, 2.0]])
+def test_with_nothing_to_answer_for_it_refuses(law) -> None:
+    mpc = controller({0.0: becomes(Status.FAILED)}, backup=law)
+    with pytest.raises(ControlRefused, match=r"FAILED: as the script says; there is no earlier"):
+        mpc.step([1.0, 0.0], 0.0)
+    rollout = loop(mpc)
+    assert len(rollout.inputs) == 0
+    assert "FAILED" in rollout.ended
+
+
+def test_the_backup_law_is_saturated() -> None:
+    mpc = controller({0.0: becomes(Status.FAILED)}, backup=lambda x, t: [100.0])
+    decision = mpc.step([1.0, 0.0], 0.0)
+    assert decision.input == LIMIT
+    assert decision.clipped == pytest.approx(98.0)
+
+
+def test_a_missing_measurement_is_no_state() -> None:
+    mpc = controller()
+    mpc.step([1.0, 0.0], 0.0)
+    decision = mpc.step([np.nan, 0.0], DT)
+    assert decision.outcome is Outcome.SHIFTED
+    assert "the measurement is not finite" in decision.message
+    assert mpc.step([0.9, -0.2], 2 * DT).outcome is Outcome.OPTIMAL
+
+
+def test_late_answers_are_kept_for_later() -> None:
+    mpc = controller()
+    first = mpc.step([1.0, 0.0], 0.0)
+    late = mpc.step([0.99, -0.2], DT, late=True)
+    assert late.outcome is Outcome.SHIFTED
+    assert late.late
+    assert late.plan is first.plan
+    assert mpc.memory.plan is not first.plan
+    slow = replace(mpc, budget=1e-9)
+    with pytest.raises(ControlRefused, match="too late for its step"):
+        slow.step([1.0, 0.0], 0.0)
+
+
+faults = st.sampled_from(
+    [
+        raises(RuntimeError("no")),
+        raises(ValueError("no")),
+        becomes(Status.INFEASIBLE),
+        becomes(Status.ITERATION_LIMIT),
+        becomes(Status.NO_PROGRESS),
+        leaves_bounds(1e-8),
+        leaves_bounds(1.0),
+        lambda solution: solution.with_(x=10.0 * solution.x),
+    ]
+)
+jumps = st.sampled_from([[0.0, 0.0], [np.nan, 0.0], [5.0, 0.0], [0.0, -3.0], [np.inf, np.nan]])
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    script=st.dictionaries(st.integers(0, 14), faults, max_size=10),
+    sensors=st.dictionaries(st.integers(1, 14), jumps, max_size=8),
+)
+def test_whatever_fails_no_input_is_out_of_bounds(script, sensors) -> None:
+    mpc = SHARED
+    SCRIPT.clear()
+    SCRIPT.update({round(k * DT, 2): change for k, change in script.items()})
+    mpc.reset()
+    x = np.array([1.0, 0.0])
+    for k in range(15):
+        decision = mpc.step(x + sensors.get(k, [0.0, 0.0]), k * DT)
+        assert is_an_input(decision.input)
+        assert (decision.outcome is Outcome.OPTIMAL) or decision.message
+        x = x + DT * np.array([x[1], decision.input[0]])
+
+
+# Built once for all examples; each writes its own script.
+SCRIPT: dict[float, Change] = {}
+SHARED = MPC(
+    ocp=cart(),
+    solver=Scripted(SCRIPT),
+    dt=DT,
+    backup=lambda x, t: [-3.0 * x[0] - 3.0 * x[1]],
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"dt": 0.0}, "dt = 0.0"),
+        ({"dt": np.nan}, "dt = nan"),
+        ({"dt": 2.0}, "longer than the horizon"),
+        ({"dt": 0.1, "delay": 0.15}, "no multiple"),
+        ({"dt": 0.1, "delay": -0.1}, "no multiple"),
+        ({"dt": 0.1, "budget": 0.0}, "budget"),
+        ({"dt": 0.1, "tolerance": -1.0}, "tolerance"),
+    ],
+)
+def test_bad_options(options, word) -> None:
+    with pytest.raises(ProblemError, match=word):
+        MPC(ocp=cart(), solver=MultipleShooting(10), **options)
+
+
+@pytest.mark.parametrize("x", [[1.0], [[1.0, 0.0]], [1.0, 0.0, 0.0]])
+def test_a_state_of_a_wrong_shape(x) -> None:
+    with pytest.raises(ProblemError, match="shape"):
+        controller().step(x, 0.0)
+
+
+def test_bounds_of_a_control_are_the_problems() -> None:
+    with pytest.raises(ProblemError, match="those of the problem"):
+        Applied("control", Box(-1, 1))

@@ -1,0 +1,252 @@
+"""Loops: every kind of controller, real plants, delay, what is kept, and the flight recorder."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models import PlanarArm, line, redundancy_ocp
+from ocp import (
+    MPC,
+    Applied,
+    Box,
+    FlightRecorder,
+    Law,
+    Outcome,
+    Plant,
+    ProblemError,
+    Rollout,
+    SolverError,
+    closed_loop,
+    discretise,
+    records,
+    replay,
+    solve,
+)
+from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
+from tests.mpc.problems import Scripted, cart
+
+DT = 0.1
+START = [1.0, 0.0]
+
+
+def driver(**options) -> MPC:
+    return MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, **options)
+
+
+# -- every solver, every controller --------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [MultipleShooting(20), Schuetz.sound(intervals=20), IndirectShooting(), Greedy(intervals=20)],
+    ids=lambda solver: type(solver).__name__,
+)
+def test_continuous_solvers_run_in_the_loop(solver) -> None:
+    ocp = unconstrained()
+    rollout = MPC(ocp=ocp, solver=solver, dt=0.05).run(Plant(ocp=ocp), START, 1.0).or_raise()
+    planned = [outcome.is_planned for outcome in rollout.outcomes]
+    assert all(planned)
+    if not isinstance(solver, Greedy):
+        best = MPC(ocp=ocp, solver=MultipleShooting(20), dt=0.05)
+        assert rollout.cost == pytest.approx(best.run(Plant(ocp=ocp), START, 1.0).cost, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    "solver", [LinearMPC(), LinearMPC(form="condensed"), Riccati(), MultipleShooting()], ids=repr
+)
+def test_linear_solvers_run_in_the_loop(solver) -> None:
+    ocp = discretise(unconstrained(), dt=0.05)
+    rollout = MPC(ocp=ocp, solver=solver, dt=0.05).run(Plant(ocp=ocp), START, 1.0).or_raise()
+    assert set(rollout.outcomes) == {Outcome.OPTIMAL}
+    other = MPC(ocp=ocp, solver=LinearMPC(), dt=0.05).run(Plant(ocp=ocp), START, 1.0)
+    np.testing.assert_allclose(rollout.inputs, other.inputs, atol=1e-6)
+
+
+def unconstrained():
+    return replace(cart(), constraints=(), control_bounds=Box())
+
+
+def test_a_plain_law_in_the_same_loop() -> None:
+    ocp = cart()
+    law = Law(law=lambda x, t: [-5.0 * x[0] - 3.0 * x[1]], bounds=ocp.control_bounds)
+    rollout = closed_loop(law, Plant(ocp=ocp), START, 5.0, dt=DT).or_raise()
+    assert set(rollout.outcomes) == {Outcome.FEASIBLE}
+    assert np.abs(rollout.x[-1]).max() < 0.05
+    assert rollout.clipped[0] == pytest.approx(3.0)
+    wrong = closed_loop(Law(law=lambda x, t: [np.nan]), Plant(ocp=ocp), START, 1.0, dt=DT)
+    with pytest.raises(SolverError, match=r"ended at t = 0 s.*the law returned"):
+        wrong.or_raise()
+
+
+def test_a_robot_takes_joint_velocities() -> None:
+    arm, start = PlanarArm((1.0, 1.0, 1.0)), np.array([2.0, -1.0, -1.0])
+    path = line(np.array(arm.end_effector(start)).ravel(), (-0.5, 0.0))
+    ocp = redundancy_ocp(arm, path, theta0=start, horizon=0.3, correction=20.0)
+    plant = Plant(
+        ocp=redundancy_ocp(arm, path, theta0=start, horizon=0.3, form="velocity"),
+        measurement_noise=1e-3,
+    )
+    applied = Applied("rate", Box(-5.0, 5.0))
+    mpc = MPC(ocp=ocp, solver=MultipleShooting(15), dt=0.02, applied=applied)
+    rollout = mpc.run(plant, start, 1.0, seed=3).or_raise()
+    assert rollout.drift < 5e-3, "with the correction noise leaves no offset"
+    plain = MPC(
+        ocp=replace_correction(arm, path, start), solver=mpc.solver, dt=0.02, applied=applied
+    )
+    assert plain.run(plant, start, 1.0, seed=3).drift < 0.1
+
+
+def replace_correction(arm, path, start):
+    return redundancy_ocp(arm, path, theta0=start, horizon=0.3, correction=1.0)
+
+
+# -- plants --------------------------------------------------------------------------------
+
+
+def test_noise_is_seeded() -> None:
+    plant = Plant(ocp=cart(), measurement_noise=[0.01, 0.02], process_noise=0.05, jitter=0.2)
+    one, same, other = (driver().run(plant, START, 1.0, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one.x, same.x)
+    np.testing.assert_array_equal(one.t, same.t)
+    assert not np.allclose(one.x, other.x)
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        Plant(ocp=cart(mass=1.3)),
+        Plant(ocp=cart(mass=0.7)),
+        Plant(ocp=cart(), lag=0.05),
+        Plant(ocp=cart(), disturbance=lambda t: [0.3]),
+        Plant(ocp=cart(), saturation=Box(-1.0, 1.0)),
+    ],
+    ids=["heavy", "light", "lag", "load", "weak"],
+)
+def test_a_plant_that_is_not_the_model_is_still_brought_home(plant) -> None:
+    rollout = driver().run(plant, START, 6.0).or_raise()
+    assert np.abs(rollout.x[-1]).max() < 0.1
+    assert np.abs(rollout.inputs).max() <= 2.0
+
+
+def test_the_cost_is_that_of_the_plants_own_trajectory() -> None:
+    """One plan followed to its end: the loop's cost is the referee's of that plan."""
+    ocp = cart()
+    plan = solve(ocp, MultipleShooting(10))
+    law = Law(law=lambda x, t: plan.control(t + 1e-9))
+    rollout = closed_loop(law, Plant(ocp=ocp, substeps=20), START, 1.0, dt=DT)
+    end = float(ocp.functions.terminal_cost(rollout.x[-1], 1.0, []))
+    assert rollout.cost + end == pytest.approx(plan.cost, rel=1e-5)
+
+
+# -- delay -----------------------------------------------------------------------------------
+
+
+def test_compensation_takes_the_loss_of_a_delay_away() -> None:
+    plant = Plant(ocp=cart())
+    prompt = driver().run(plant, START, 3.0).cost
+    late = {on: driver(delay=2 * DT, compensate=on).run(plant, START, 3.0) for on in (True, False)}
+    # Two intervals pass before anything acts; what they cost no controller can save.
+    idle = closed_loop(Law(law=lambda x, t: [0.0]), plant, START, 2 * DT, dt=DT).cost
+    assert late[True].cost - prompt <= 1.05 * idle
+    assert late[False].cost > 1.05 * late[True].cost
+    assert late[True].decisions[0].applies_at == pytest.approx(2 * DT)
+
+
+# -- what is kept ------------------------------------------------------------------------------
+
+
+def test_a_rollout_is_saved_and_read(tmp_path: Path) -> None:
+    rollout = driver().run(Plant(ocp=cart()), START, 0.5)
+    back = Rollout.load(rollout.save(tmp_path / "loop"), cart())
+    np.testing.assert_array_equal(back.x, rollout.x)
+    assert back.outcomes == rollout.outcomes
+    assert back.messages == rollout.messages
+    assert back.cost == rollout.cost
+    with pytest.raises(ProblemError, match="is a loop with 'cart'"):
+        Rollout.load(tmp_path / "loop.npz", unconstrained_named())
+    (tmp_path / "no.npz").write_bytes(b"nothing")
+    with pytest.raises(ProblemError, match="no saved rollout"):
+        Rollout.load(tmp_path / "no.npz", cart())
+
+
+def unconstrained_named():
+    return replace(cart(), name="another")
+
+
+def test_a_rollout_is_drawn(tmp_path: Path) -> None:
+    script = {0.2: lambda s: s.with_(u=s.u + 9.0)}
+    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT)
+    figure = mpc.run(Plant(ocp=cart()), START, 0.5).plot()
+    assert "1 shifted" in figure.get_suptitle()
+    figure.savefig(tmp_path / "loop.png")
+
+
+@pytest.mark.parametrize("delay", [0.0, DT])
+def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: float) -> None:
+    script = {round(t + delay, 2): lambda s: s.with_(u=s.u + 9.0) for t in (0.2, 0.3)}
+    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT, delay=delay, backup=lambda x, t: [-x[0]])
+    plant = Plant(ocp=cart(mass=1.2), measurement_noise=0.01)
+    file = tmp_path / "flight"
+    with FlightRecorder(mpc, file) as recorder:
+        rollout = mpc.run(plant, START, 0.8, watch=recorder.watch)
+    found = list(records(file))
+    assert [record.outcome for record in found] == list(rollout.outcomes)
+    assert rollout.outcomes.count(Outcome.SHIFTED) == 2
+    assert all(replay(mpc, file, k).is_exact for k in range(len(found)))
+    with pytest.raises(ProblemError, match="has no step 8"):
+        replay(mpc, file, 8)
+    with pytest.raises(ProblemError, match="records the solver"):
+        replay(driver(), file, 0)
+
+
+def test_a_solver_that_remembers_replays_from_the_start(tmp_path: Path) -> None:
+    ocp = discretise(cart_without_path(), dt=0.05)
+    mpc = MPC(ocp=ocp, solver=LinearMPC(), dt=0.05)
+    assert mpc.remembers
+    with FlightRecorder(mpc, tmp_path / "flight") as recorder:
+        mpc.run(Plant(ocp=ocp, measurement_noise=0.01), START, 1.0, watch=recorder.watch)
+    assert replay(mpc, tmp_path / "flight", 17).is_exact
+
+
+def cart_without_path():
+    return replace(cart(), constraints=())
+
+
+def test_a_record_that_was_cut_off_is_ignored(tmp_path: Path) -> None:
+    mpc, file = driver(), tmp_path / "flight"
+    with FlightRecorder(mpc, file) as recorder:
+        mpc.run(Plant(ocp=cart()), START, 0.5, watch=recorder.watch)
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-20])
+    assert len(list(records(file))) == 4
+    assert replay(mpc, file, 3).is_exact
+    file.write_bytes(b"something else\n")
+    with pytest.raises(ProblemError, match="no flight record"):
+        list(records(file))
+
+
+# -- bad input -----------------------------------------------------------------------------------
+
+
+def test_what_does_not_fit_is_said() -> None:
+    with pytest.raises(ProblemError, match="no multiple of dt"):
+        driver().run(Plant(ocp=cart()), START, 0.55)
+    with pytest.raises(ProblemError, match="plant: x0 has 3 entries"):
+        driver().run(Plant(ocp=cart()), [1.0, 0.0, 0.0], 0.5)
+    arm = MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, applied=Applied("rate"))
+    with pytest.raises(ProblemError, match="sends 2 inputs, the plant 'cart' takes 1"):
+        arm.run(Plant(ocp=cart()), START, 0.5)
+    bad_plants: tuple[dict[str, Any], ...] = (
+        {"lag": -1.0},
+        {"jitter": 1.0},
+        {"substeps": 0},
+        {"measurement_noise": [1, 2, 3]},
+    )
+    for bad in bad_plants:
+        with pytest.raises(ProblemError, match="plant"):
+            Plant(ocp=cart(), **bad)
+    with pytest.raises(ProblemError, match=r"dt = 0\.1 s, but the model's step"):
+        MPC(ocp=discretise(cart_without_path(), dt=0.05), solver=LinearMPC(), dt=0.1)
