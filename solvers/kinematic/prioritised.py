@@ -56,6 +56,7 @@ class PrioritisedKinematics:
         names = [task.name for task in tasks]
         if len(set(names)) < len(names):
             raise ProblemError(f"kinematics: two tasks have the same name: {', '.join(names)}")
+        instance(self.damping, (Inverse, tuple, list), "kinematics: damping")
         if len(self.inverses) != len(tasks):
             raise ProblemError(f"kinematics: {len(self.inverses)} inverses for {len(tasks)} tasks")
         for i, inverse in enumerate(self.inverses):

@@ -118,9 +118,10 @@ class KinematicProgram:
         )
 
     def _verdict(self, t: np.ndarray, error: np.ndarray) -> tuple[Status, str]:
-        """Was the first task done? An arm that starts off its path has until the end."""
+        """Was the first task done? An arm may start off its path, but has to stay once there."""
         limit = self.tolerance
-        missed = error > limit if error[0] <= limit else (t == t[-1]) & (error > limit)
+        there = error <= limit
+        missed = (np.cumsum(there) > 0) & ~there if there.any() else ~there
         if not missed.any():
             return Status.MYOPIC, ""
         k, name = int(missed.argmax()), self.tasks[0].name

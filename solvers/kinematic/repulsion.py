@@ -49,7 +49,7 @@ class Repulsion:
                 raise ProblemError(f"repulsion: {name} = {value!r}, a positive number is needed")
         if self.d_i <= self.d_m:
             raise ProblemError(
-                f"repulsion: d_i = {self.d_i} m must be larger than d_m = {self.d_m}"
+                f"repulsion: d_i = {self.d_i} m must be larger than d_m = {self.d_m} m"
             )
 
     def velocity_gain(self, distance: ca.SX) -> ca.SX:
