@@ -1,4 +1,4 @@
-"""The figures of chapter 2 of the thesis, each drawn from results computed for it."""
+"""The figures of the thesis, each drawn from results computed for it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,9 @@ from benchmarks.figures import (
     dynamic_programming,
     free_and_forced,
     horizon_map,
+    instantaneous,
     interval,
+    newton_steps,
     predictive,
     regulation,
 )
@@ -48,6 +50,9 @@ FIGURES = (
     Figure("2.12", "approaching the constraint", constrained.approach),
     Figure("2.13", "a smaller interval", interval.smaller_steps),
     Figure("2.14", "horizon and interval", horizon_map.horizon_and_interval),
+    Figure("3.3", "gains of the repulsive velocity", instantaneous.gains),
+    Figure("3.4", "null-space motion past an obstacle", instantaneous.avoidance),
+    Figure("3.6", "Newton's steps in single shooting", newton_steps.convergence),
 )
 
 
