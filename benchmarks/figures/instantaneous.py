@@ -1,9 +1,12 @@
 """Fig. 3.3 and 3.4: the gains of the repulsive velocity, and what it does to an arm."""
 
+from functools import partial
+
 import casadi as ca
 import numpy as np
 from matplotlib.axes import Axes
 
+from benchmarks.animation import animate
 from benchmarks.arm_drawing import draw_obstacles, draw_postures, metres
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, label, sheet
@@ -72,7 +75,12 @@ def avoidance() -> Drawing:
         over_time.text(0.0, level, f" {what}", va="bottom")
     label(over_time, "time [s]", "distance of the closest link from the centre [m]")
     over_time.legend(fontsize=8)
-    return Drawing(picture, columns, _sentence(scenario, runs))
+    moved = runs["path, then obstacle"]
+    film = partial(
+        animate, scenario.arm, moved.t, moved.q,
+        obstacles=(scenario.disc,), influence=_REPULSION.d_m, title=scenario.name,
+    )  # fmt: skip
+    return Drawing(picture, columns, _sentence(scenario, runs), film)
 
 
 def _run(scenario: ArmScenario, controller: PrioritisedKinematics) -> KinematicRun:

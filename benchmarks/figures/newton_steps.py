@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.cases import all_cases, arm_scenario
 from benchmarks.figures.drawing import COLOURS, Drawing, label, sheet
-from ocp import Guess, Solution, solve
+from ocp import Guess, Solution, evaluate, solve
 from solvers import IndirectShooting
 
 _SCENARIO = "arm-001"
@@ -44,10 +44,10 @@ def _sentence(runs: dict[tuple[str, float], Solution]) -> str:
     best = next(c.reference for c in all_cases() if c.name == f"{_SCENARIO}-sum") or np.nan
     long, tamed = runs["undamped", _HORIZONS[-1]], runs["damped", _HORIZONS[-1]]
     return (
-        f"Fig. 3.6: undamped Newton takes {steps}, with the longer horizon over detours of many "
-        f"orders of magnitude; a zero of ψ(t1) is no optimum: the extremal found at "
-        f"{_HORIZONS[-1]:g} s costs {long.cost:.1f}, the optimum {best:.2f}. Damped, the same "
-        f"guess ends as {tamed.status.name.replace('_', ' ').lower()} there after "
+        f"Fig. 3.6: undamped Newton steps: {steps}, at the longest horizon wandering about for "
+        "most of them; a zero of ψ(t1) is no optimum: the extremal found at "
+        f"{_HORIZONS[-1]:g} s costs {evaluate(long).cost:.1f}, the optimum {best:.2f}. Damped, "
+        f"the same guess ends as {tamed.status.name.replace('_', ' ').lower()} there after "
         f"{tamed.iterations} steps. Chosen here: {_SCENARIO}, the sum over links, "
         f"ψ(t0) = {_GUESS} in the sign of the minimum principle, exact Jacobian, 300 RK4 steps."
     )
