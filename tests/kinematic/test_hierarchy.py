@@ -40,8 +40,9 @@ def test_least_squares_in_strict_order(seed: int, n: int, rows: list[int]) -> No
     levels = drawn(seed, n, [2, *rows])
     dq = prioritised_velocity(levels, n, decoupled=True)
     expected = lexicographic(levels, n)
-    scale = 1.0 + np.abs(expected).max()
-    np.testing.assert_allclose(dq, expected, atol=QP * scale * 1e2 if len(rows) > 2 else QP * scale)
+    # Two ways round the same nearly singular J N differ by rounding times its inverse squared.
+    scale = 1.0 + np.abs(expected).max() ** 2
+    np.testing.assert_allclose(dq, expected, atol=QP * scale)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -54,8 +55,7 @@ def test_two_tasks_are_a_quadratic_program(seed: int, n: int, rows: list[int]) -
     x = solve_qp(np.eye(n), np.zeros(n), A=a, b=b, solver="quadprog")
     assert x is not None
     dq = prioritised_velocity(levels, n, decoupled=True)
-    if np.linalg.cond(a) < 1e3:
-        np.testing.assert_allclose(dq, x, atol=QP)
+    np.testing.assert_allclose(dq, x, atol=QP * (1.0 + np.abs(x).max()))
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -12,6 +12,7 @@ from models import Capsule, Disc, PlanarArm, Polygon
 from ocp import evaluate
 
 
+@pytest.mark.slow
 def test_a_film_of_an_arm_among_moving_obstacles(tmp_path):
     symbol, arm = ca.SX.sym("t"), PlanarArm((1.0, 0.8))
     obstacles = (
