@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
+from benchmarks.arm_drawing import draw_obstacles, draw_postures, metres
 from benchmarks.cases import arm_scenario
 from models import ArmScenario
 from ocp import Solution, evaluate, solve
@@ -54,16 +54,9 @@ def bench_picture(case: str, out: Path) -> Path:
 def _motion(axes: Axes, scenario: ArmScenario, method: str, solution: Solution) -> None:
     times = np.linspace(solution.t[0], solution.t[-1], _POSTURES)
     postures = scenario.arm.positions(solution.state(times))
-    axes.add_patch(Circle(scenario.obstacle, scenario.influence, color="tab:red", alpha=0.1, lw=0))
-    axes.add_patch(Circle(scenario.obstacle, scenario.radius, color="tab:red", alpha=0.55, lw=0))
-    for i, posture in enumerate(postures):
-        shade = 0.15 + 0.85 * i / (_POSTURES - 1)
-        axes.plot(*posture.T, "-o", color="tab:blue", alpha=shade, lw=2, ms=3)
-    axes.plot(*postures[:, -1].T, color="black", lw=1.5)
-    axes.plot(*postures[0, 0], "s", color="black", ms=7)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
+    draw_obstacles(axes, (scenario.disc,), scenario.influence)
+    draw_postures(axes, postures)
+    metres(axes)
     cost, word = evaluate(solution).cost, solution.status.name.replace("_", " ").lower()
     axes.set_title(f"{method}\n{word}, cost {cost:.4f}", fontsize=10)
 

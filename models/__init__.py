@@ -1,9 +1,11 @@
 """Robots, obstacles, tasks and textbook problems, each as symbolic models."""
 
 from models.arm import PlanarArm
+from models.avoidance import clearance_constraint
 from models.carima import Carima, CarimaPlant
 from models.carima_ocp import carima_ocp
 from models.distance_cost import Combine, DistanceCost
+from models.distances import distance_to_segment, signed_distance
 from models.double_integrator import (
     bryson_denham,
     discrete_double_integrator,
@@ -25,14 +27,22 @@ from models.linear_problems import (
     thesis_tracking,
     tracking_ocp,
 )
-from models.obstacles import Disc, distance_to_segment, link_distances
+from models.obstacle_data import obstacles_from_data
+from models.obstacles import Capsule, Disc, Obstacle, Polygon, link_distances
 from models.oscillators import hypersensitive, rayleigh, van_der_pol
 from models.paths import Path, line, path_position, path_velocity
+from models.posture_cost import (
+    JointLimitCost,
+    ManipulabilityCost,
+    PostureCost,
+    squared_manipulability,
+)
 from models.redundancy import Cost, Form, redundancy_ocp
 from models.scenarios import ArmScenario, Difficulty, random_scenarios
 
 __all__ = [
     "ArmScenario",
+    "Capsule",
     "Carima",
     "CarimaPlant",
     "Combine",
@@ -41,11 +51,17 @@ __all__ = [
     "Disc",
     "DistanceCost",
     "Form",
+    "JointLimitCost",
     "LinearPlant",
+    "ManipulabilityCost",
+    "Obstacle",
     "Path",
     "PlanarArm",
+    "Polygon",
+    "PostureCost",
     "bryson_denham",
     "carima_ocp",
+    "clearance_constraint",
     "discrete_double_integrator",
     "distance_to_segment",
     "double_integrator_energy",
@@ -55,12 +71,15 @@ __all__ = [
     "link_distances",
     "lq_regulator",
     "mass_spring_damper",
+    "obstacles_from_data",
     "path_position",
     "path_velocity",
     "random_scenarios",
     "rayleigh",
     "redundancy_ocp",
+    "signed_distance",
     "sinusoid",
+    "squared_manipulability",
     "stable_plant",
     "state_space",
     "step_reference",

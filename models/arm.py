@@ -73,6 +73,10 @@ class PlanarArm:
         """Return r(theta), the position of the end effector (2,) [m]."""
         return self.joints(theta)[:, -1]
 
+    def orientation(self, theta: ca.SX | ArrayLike) -> ca.SX:
+        """Return the direction of the last link [rad], a scalar, not wrapped."""
+        return ca.sum1(self._angles(theta))
+
     def jacobian(self, theta: ca.SX | ArrayLike) -> ca.SX:
         """Return J = dr/dtheta (2, n) [m].
 

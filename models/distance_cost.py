@@ -9,7 +9,7 @@ import casadi as ca
 
 from models._numbers import at_least
 from models.arm import PlanarArm
-from models.obstacles import Disc, link_distances
+from models.obstacles import Obstacle, link_distances
 from ocp import ProblemError
 
 Combine = Literal["sum", "closest"]
@@ -23,8 +23,8 @@ class DistanceCost:
 
         p_0(d) = \frac{s}{3} \max\Bigl(0, \; d_m \frac{d_m - d}{d_m - d_b}\Bigr)^3
 
-    d is the distance from the disc's centre to a link, d_b its radius. At the disc's edge
-    the cost is s d_m³/3, inside it stays finite.
+    d is the distance from the core of an obstacle (a disc's centre) to a link, d_b its
+    radius. At the obstacle's edge the cost is s d_m³/3, inside it stays finite.
 
     Source: thesis (3.48), with the max(0, ·) that it leaves out.
 
@@ -60,11 +60,11 @@ class DistanceCost:
         """Return p0, element by element.
 
         Args:
-            distance: from the centre of a disc (m,) [m].
-            radius: d_b of the disc [m].
+            distance: from the core of an obstacle (m,) [m].
+            radius: d_b of the obstacle [m].
 
         Raises:
-            ProblemError: if the influence ends inside the disc.
+            ProblemError: if the influence ends inside the obstacle.
         """
         d_m = self.influence
         if not d_m > radius:
@@ -75,12 +75,12 @@ class DistanceCost:
         depth = ca.fmax(0.0, (d_m - distance) * (d_m / (d_m - radius)))
         return self.gain / 3.0 * depth * depth**2
 
-    def of(self, arm: PlanarArm, theta: ca.SX, obstacles: Sequence[Disc]) -> ca.SX:
+    def of(self, arm: PlanarArm, theta: ca.SX, obstacles: Sequence[Obstacle]) -> ca.SX:
         """Return the cost of a configuration (n,) [rad] among obstacles, a scalar."""
         total = ca.SX(0)
-        for disc in obstacles:
-            distances = link_distances(arm, theta, disc)
+        for obstacle in obstacles:
+            distances = link_distances(arm, theta, obstacle)
             if self.combine == "closest":
                 distances = reduce(ca.fmin, ca.vertsplit(distances))
-            total += ca.sum1(self.at_distance(distances, disc.radius))
+            total += ca.sum1(self.at_distance(distances, obstacle.radius))
         return total

@@ -9,11 +9,13 @@ from numpy.typing import ArrayLike
 
 from models._numbers import at_least, vector
 from models.arm import PlanarArm
+from models.avoidance import Surroundings, check_avoidance, clearance_constraint
 from models.distance_cost import DistanceCost
-from models.obstacles import Disc, link_distances
+from models.obstacles import Obstacle
 from models.paths import Path, path_position, path_velocity
+from models.posture_cost import PostureCost
 from models.task import Task
-from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal
+from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal, instance
 
 Cost = Literal["regularised", "raw"]
 Form = Literal["null-space", "velocity"]
@@ -25,13 +27,14 @@ def redundancy_ocp(
     *,
     theta0: ArrayLike,
     horizon: float,
-    obstacles: Sequence[Disc] = (),
+    obstacles: Sequence[Obstacle] = (),
     distance_cost: DistanceCost | None = None,
+    posture_costs: Sequence[PostureCost] = (),
     weight: float = 1.0,
     cost: Cost = "regularised",
     form: Form = "null-space",
     correction: float = 0.0,
-    clearance: float | None = None,
+    clearance: ArrayLike | None = None,
     joint_bounds: Box | None = None,
     velocity_bounds: Box | None = None,
     free_start: bool = False,
@@ -71,21 +74,25 @@ def redundancy_ocp(
         path: r_d(t), any callable from the time symbol to (2,) [m].
         theta0: start configuration (n,) [rad].
         horizon: duration [s].
-        obstacles: discs; with none there is no distance cost.
+        obstacles: any number, of any shape, at rest or moving; with none there is no
+            distance cost.
         distance_cost: p0; ``None``: no such cost.
+        posture_costs: what else is charged, such as ``JointLimitCost``; each has its own
+            gain and is added to the running cost.
         weight: k of (3.37), not negative.
         cost: ``"regularised"`` or ``"raw"``; the velocity form has only one cost.
         form: ``"null-space"`` or ``"velocity"``.
         correction: K of (3.18) [1/s], not negative; 0: a path error stays for ever.
-        clearance: every link keeps at least this distance [m] from the centre of every
-            disc, as path constraint ``"clearance"``; ``None``: no such constraint.
+        clearance: every link keeps at least this distance [m] from the core of every
+            obstacle (a disc's centre), as path constraint ``"clearance"``; one number, or
+            one for each obstacle, such as its radius; ``None``: no such constraint.
         joint_bounds: limits of θ [rad].
         velocity_bounds: limits of dθ/dt [rad/s]: control bounds of the velocity form, path
             constraint ``"joint velocity"`` of the null-space form.
         free_start: require only that the end effector starts on the path (initial
             constraint ``"start on path"``, thesis 3.46); ``theta0`` is then a guess.
         parameters: parameters and signals in the path or in the obstacles.
-        t: the symbol of time [s] where an obstacle's centre depends on it.
+        t: the symbol of time [s] where an obstacle's position depends on it.
         name: what people call the problem.
 
     Returns:
@@ -93,7 +100,8 @@ def redundancy_ocp(
 
     Raises:
         ProblemError: for numbers out of range, a path that starts elsewhere than the arm
-            (unless corrected or free) or leaves the workspace, a singular start.
+            (unless corrected or free) or leaves the workspace, a singular start, an
+            obstacle on the base, a start inside an obstacle.
     """
     t = ca.SX.sym("t") if t is None else t
     start = vector(theta0, arm.n, f"{name}: theta0")
@@ -101,25 +109,31 @@ def redundancy_ocp(
     k = at_least(weight, 0.0, f"{name}: weight")
     gain = at_least(correction, 0.0, f"{name}: correction")
     _check_choices(name, cost, form)
-    _check_avoidance(name, obstacles, distance_cost, clearance)
+    check_avoidance(name, obstacles, distance_cost, clearance)
+    _check_kinds(name, posture_costs, joint_bounds, velocity_bounds)
     target = path_position(path, t)
     task = Task(
         arm=arm, position=target, t=t, horizon=duration, parameters=tuple(parameters), name=name
     )
     task.check(start, must_start_on_path=gain == 0.0 and not free_start)
+    around = Surroundings(
+        arm=arm, obstacles=obstacles, t=t, horizon=duration, parameters=parameters, name=name
+    )
+    around.check(None if free_start else start)
 
     theta = ca.SX.sym("theta", arm.n)
     error = arm.end_effector(theta) - target
     rate = path_velocity(path, t) - gain * error
     motion = _motion(arm.jacobian(theta), rate, cost, form)
-    avoidance = k * distance_cost.of(arm, theta, obstacles) if distance_cost else ca.SX(0)
+    avoided = obstacles if distance_cost and k > 0.0 else ()
+    avoidance = k * distance_cost.of(arm, theta, avoided) if distance_cost else ca.SX(0)
+    posture = sum((term.of(arm, theta) for term in posture_costs), ca.SX(0))
     constraints = [*motion.task]
     if velocity_bounds and form == "null-space":
         limits = velocity_bounds
         constraints += [Constraint("joint velocity", motion.velocity, limits.lower, limits.upper)]
     if clearance is not None:
-        distances = [link_distances(arm, theta, disc) for disc in obstacles]
-        constraints += [Constraint("clearance", ca.vertcat(*distances), lower=clearance)]
+        constraints += [clearance_constraint(arm, theta, obstacles, clearance)]
     if free_start:
         constraints += [Constraint("start on path", error, 0.0, 0.0, at="initial")]
     return OCP(
@@ -127,13 +141,13 @@ def redundancy_ocp(
         model=_model(arm, theta, motion, t),
         x0=start,
         horizon=duration,
-        running_cost=avoidance + motion.effort,
+        running_cost=avoidance + posture + motion.effort,
         control_bounds=velocity_bounds if velocity_bounds and form == "velocity" else Box(),
         state_bounds=joint_bounds or Box(),
         constraints=tuple(constraints),
         invariants=(Constraint("task error", error, 0.0, 0.0),),
         parameters=tuple(parameters),
-        smoothness=distance_cost.smoothness if distance_cost and obstacles and k > 0.0 else 2,
+        smoothness=_smoothness(distance_cost, avoided, posture_costs),
     )
 
 
@@ -196,16 +210,26 @@ def _check_choices(name: str, cost: Cost, form: Form) -> None:
         raise ProblemError(f"{name}: form = {form!r}, neither null-space nor velocity")
 
 
-def _check_avoidance(
+def _check_kinds(
     name: str,
-    obstacles: Sequence[Disc],
-    distance_cost: DistanceCost | None,
-    clearance: float | None,
+    posture_costs: Sequence[PostureCost],
+    joint_bounds: Box | None,
+    velocity_bounds: Box | None,
 ) -> None:
-    """Refuse obstacles that nothing avoids, and a clearance from nothing."""
-    if clearance is not None:
-        at_least(clearance, 0.0, f"{name}: clearance", strictly=True)
-        if not obstacles:
-            raise ProblemError(f"{name}: a clearance is asked for, but there are no obstacles")
-    elif obstacles and distance_cost is None:
-        raise ProblemError(f"{name}: obstacles need a distance_cost or a clearance to matter")
+    for i, term in enumerate(posture_costs):
+        instance(term, PostureCost, f"{name}: posture_costs[{i}]")
+    for what, box in (("joint_bounds", joint_bounds), ("velocity_bounds", velocity_bounds)):
+        if box is not None:
+            instance(box, Box, f"{name}: {what}")
+
+
+def _smoothness(
+    distance_cost: DistanceCost | None,
+    avoided: Sequence[Obstacle],
+    posture_costs: Sequence[PostureCost],
+) -> Literal[0, 1, 2]:
+    """The least smooth term of the running cost."""
+    terms = {term.smoothness for term in posture_costs}
+    if distance_cost and avoided:
+        terms |= {distance_cost.smoothness, *[obstacle.smoothness for obstacle in avoided]}
+    return 0 if 0 in terms else 1 if 1 in terms else 2

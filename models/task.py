@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from models.arm import PlanarArm
-from ocp import Parameter, ParameterValues, ProblemError, Signal
+from models.sampling import sampled
+from ocp import Parameter, ProblemError, Signal
 
 # A path may begin this far from the end effector [m].
 _ON_PATH = 1e-9
@@ -14,8 +15,6 @@ _ON_PATH = 1e-9
 _SINGULAR = 1e-6
 # Rounding at the border of the workspace [m].
 _BORDER = 1e-9
-# Instants at which the path is looked at.
-_INSTANTS = 1001
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,7 +49,9 @@ class Task:
                 workspace (naming the time) or begins elsewhere than the arm (naming the
                 distance), or if the start is singular.
         """
-        times, points = self._sampled()
+        times, points = sampled(
+            self.position, self.t, self.horizon, self.parameters, f"{self.name}: the path"
+        )
         broken = np.flatnonzero(~np.isfinite(points).all(axis=1))
         if broken.size:
             raise ProblemError(f"{self.name}: the path is not finite at t = {times[broken[0]]:g} s")
@@ -58,20 +59,6 @@ class Task:
             self._refuse_gap(theta0, points[0])
         self._refuse_singular(theta0)
         self._refuse_unreachable(times, points)
-
-    def _sampled(self) -> tuple[np.ndarray, np.ndarray]:
-        symbols = ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.parameters])
-        known = {s.element_hash() for s in ca.vertsplit(ca.vertcat(self.t, symbols))}
-        foreign = [str(s) for s in ca.symvar(self.position) if s.element_hash() not in known]
-        if foreign:
-            raise ProblemError(
-                f"{self.name}: the path contains {', '.join(foreign)}, neither t nor a parameter"
-            )
-        shares = np.linspace(0.0, 1.0, _INSTANTS)
-        values = ParameterValues.of(self.parameters, None).at(shares)
-        function = ca.Function("path", [self.t, symbols], [self.position]).map(_INSTANTS)
-        times = shares * self.horizon
-        return times, np.array(function(times[None, :], values.T)).T
 
     def _refuse_gap(self, theta0: np.ndarray, start: np.ndarray) -> None:
         gap = np.linalg.norm(np.array(self.arm.end_effector(theta0)).ravel() - start)

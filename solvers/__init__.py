@@ -6,6 +6,13 @@ from solvers.gradient.schuetz import Schuetz
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
 from solvers.indirect.indirect_shooting import IndirectShooting
 from solvers.indirect.second_order import SecondOrder, second_order
+from solvers.kinematic.hierarchy import Level, prioritised_velocity
+from solvers.kinematic.prioritised import PrioritisedKinematics
+from solvers.kinematic.program import KinematicProgram
+from solvers.kinematic.pseudo_inverse import Damped, Exact, Filtered, Inverse
+from solvers.kinematic.repulsion import Repulsion, repel
+from solvers.kinematic.run import KinematicRun
+from solvers.kinematic.task import Task, descend, track
 from solvers.linear.batch import Batch
 from solvers.linear.linear_mpc import LinearMPC
 from solvers.linear.riccati import Riccati
@@ -23,6 +30,9 @@ __all__ = [
     "Armijo",
     "Axis",
     "Batch",
+    "Damped",
+    "Exact",
+    "Filtered",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
@@ -30,18 +40,29 @@ __all__ = [
     "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
+    "Inverse",
+    "KinematicProgram",
+    "KinematicRun",
+    "Level",
     "LinearMPC",
     "LocalOptimum",
     "MultipleShooting",
     "ParameterContinuation",
+    "PrioritisedKinematics",
+    "Repulsion",
     "Riccati",
     "Schuetz",
     "SecondOrder",
     "StepRule",
     "Table",
+    "Task",
+    "descend",
     "gpc_loop",
     "multistart",
     "polish",
+    "prioritised_velocity",
     "random_guesses",
+    "repel",
     "second_order",
+    "track",
 ]

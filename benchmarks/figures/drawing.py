@@ -1,7 +1,7 @@
 """What every figure is made of: a picture, its data, and a sentence; and how it is written."""
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import zip_longest
 from pathlib import Path
 from textwrap import fill
@@ -27,15 +27,17 @@ class Drawing(NamedTuple):
         picture: for matplotlib to save.
         columns: the data, by name and unit; a shorter column is filled up with blanks.
         sentence: what one sees, with the parameters that the thesis leaves out.
+        film: writes the motion to a GIF, where there is one.
     """
 
     picture: Picture
     columns: Mapping[str, np.ndarray]
     sentence: str
+    film: Callable[[Path], object] | None = None
 
 
 def write(drawing: Drawing, stem: str, out: Path) -> tuple[Path, Path]:
-    """Write picture and data, the sentence above the picture, and return both files."""
+    """Write picture, data and film, the sentence above the picture; return the first two."""
     out.mkdir(parents=True, exist_ok=True)
     picture, data = out / f"{stem}.png", out / f"{stem}.csv"
     width = int(_CAPTION * drawing.picture.get_figwidth())
@@ -48,6 +50,8 @@ def write(drawing: Drawing, stem: str, out: Path) -> tuple[Path, Path]:
         writer.writerow(drawing.columns)
         columns = [np.asarray(column).tolist() for column in drawing.columns.values()]
         writer.writerows(zip_longest(*columns, fillvalue=""))
+    if drawing.film:
+        drawing.film(out / f"{stem}.gif")
     return picture, data
 
 

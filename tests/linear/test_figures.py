@@ -1,4 +1,4 @@
-"""The figures of chapter 2: drawn, with their data, and the claims made with them."""
+"""The figures: drawn, with their data, and the claims made with them."""
 
 import csv
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from benchmarks.__main__ import main
 from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.figures.mpc_runs import all_runs, peak
 
-QUICK = ("2.2", "2.3", "2.4", "2.7", "2.8", "2.9")
+QUICK = ("2.2", "2.3", "2.4", "2.7", "2.8", "2.9", "3.3")
 SLOW = tuple(figure.number for figure in FIGURES if figure.number not in QUICK)
 
 

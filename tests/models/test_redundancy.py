@@ -8,7 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models import ArmScenario, Disc, DistanceCost, PlanarArm, line, redundancy_ocp
+from models import (
+    ArmScenario,
+    Capsule,
+    Disc,
+    DistanceCost,
+    JointLimitCost,
+    ManipulabilityCost,
+    PlanarArm,
+    Polygon,
+    PostureCost,
+    line,
+    redundancy_ocp,
+    squared_manipulability,
+)
 from ocp import OCP, Box, Parameter, ProblemError
 
 # Two of the scenarios that the solvers are compared on.
@@ -32,6 +45,7 @@ ARM_034 = ArmScenario(
     label="infeasible",
 )
 THETA0 = np.array(ARM_001.theta0)
+TRIANGLE = Polygon([[-0.2, -0.5], [0.2, -0.5], [0.0, 0.2]])
 
 
 def problem(**changes: Any) -> OCP:
@@ -213,6 +227,104 @@ def test_moving_obstacle_and_parametric_path() -> None:
     assert later < now
 
 
+def test_each_obstacle_may_have_its_own_clearance() -> None:
+    obstacles = [Disc([1.6, 0.7], 0.2), Capsule([2.0, 1.0], [2.5, 1.0], 0.1), TRIANGLE]
+    obstacles[2] = TRIANGLE.moved([2.0, -1.5])
+    ocp = problem(obstacles=obstacles, clearance=[o.radius for o in obstacles])
+    (clearance,) = ocp.at("path")
+    np.testing.assert_array_equal(np.asarray(clearance.lower), np.repeat([0.2, 0.1, 0.0], 3))
+
+
+def test_kinks_of_a_shape_are_declared() -> None:
+    cost, capsule = DistanceCost(1.0, 0.8), Capsule([2.0, 1.0], [2.5, 1.0], 0.1)
+    assert problem(distance_cost=cost, obstacles=[capsule]).smoothness == 0
+    assert problem(obstacles=[capsule], clearance=0.1).smoothness == 2
+
+
+@pytest.mark.parametrize("links", [3, 7, 12])
+def test_obstacles_of_every_shape_around_an_arm_of_many_links(links: int) -> None:
+    t = ca.SX.sym("t")
+    arm, theta = PlanarArm((3.0 / links,) * links), np.append(1.5, np.full(links - 1, -2 / links))
+    ocp = redundancy_ocp(
+        arm,
+        line(np.array(arm.end_effector(theta)).ravel(), [0.1, 0.0]),
+        theta0=theta,
+        horizon=1.0,
+        obstacles=[
+            Disc([0.5, -1.0], 0.1).moving([0.1, 0.0], t),
+            Capsule([-1.0, 1.0], [-1.0, 2.0], 0.1),
+            Polygon([[2.5, 2.5], [3.0, 2.5], [3.0, 3.0]], 0.05),
+        ],
+        distance_cost=DistanceCost(10.0, 2.0),
+        posture_costs=[JointLimitCost(1.0, -3.0, 3.0), ManipulabilityCost(1.0, 2.0)],
+        joint_bounds=Box(-3.0, 3.0),
+        velocity_bounds=Box(-2.0, 2.0),
+        t=t,
+    )
+    f = ocp.functions
+    cost = ca.Function(
+        "c", [ocp.model.x], [ca.gradient(f.running_cost(ocp.model.x, 1.0, 0.3, []), ocp.model.x)]
+    )
+    h = 1e-6
+    slopes = [
+        (
+            running_cost(ocp, theta + h * e, np.ones(links), 0.3)
+            - running_cost(ocp, theta - h * e, np.ones(links), 0.3)
+        )
+        / (2 * h)
+        for e in np.eye(links)
+    ]
+    np.testing.assert_allclose(np.array(cost(theta)).ravel(), slopes, rtol=1e-6, atol=1e-6)
+
+
+# -- what a posture costs -----------------------------------------------------------
+
+
+POSTURE = ca.SX.sym("theta", 3)
+
+
+def posture(term: PostureCost, theta: Any) -> tuple[float, np.ndarray]:
+    value = term.of(ARM_001.arm, POSTURE)
+    out = ca.Function("p", [POSTURE], [value, ca.gradient(value, POSTURE)])(theta)
+    return float(out[0]), np.array(out[1]).ravel()
+
+
+def test_joint_limit_cost() -> None:
+    term = JointLimitCost(2.0, [-1.0, -2.0, 0.0], [1.0, 2.0, 1.0])
+    assert posture(term, [0.0, 0.0, 0.5])[0] == pytest.approx(0.0)
+    assert posture(term, [1.0, -2.0, 1.0])[0] == pytest.approx(0.5)
+    np.testing.assert_allclose(posture(term, [1.0, 0.0, 0.5])[1], [1.0 / 3.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_manipulability_cost() -> None:
+    term = ManipulabilityCost(3.0, 0.5)
+    singular, slope = posture(term, [0.3, 0.0, 0.0])
+    assert singular == pytest.approx(1.0)
+    np.testing.assert_allclose(slope, 0.0, atol=1e-12)
+    assert posture(term, THETA0) == (0.0, pytest.approx(np.zeros(3)))
+    j = jacobian(ARM_001.arm, np.array([0.3, 0.1, 0.1]))
+    w2 = ca.Function("w", [POSTURE], [squared_manipulability(ARM_001.arm, POSTURE)])
+    assert float(w2([0.3, 0.1, 0.1])) == pytest.approx(np.linalg.det(j @ j.T))
+    near, slope = posture(term, [0.3, 0.1, 0.1])
+    assert 0.0 < near < 1.0
+    assert slope[1] < 0.0  # bending more costs less
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: JointLimitCost(-1.0, -1.0, 1.0), "gain = -1.0"),
+        (lambda: JointLimitCost(1.0, [1.0, 2.0], [2.0, 2.0]), "above its lower one"),
+        (lambda: JointLimitCost(1.0, [1.0, 2.0], [3.0]), "above its lower one"),
+        (lambda: JointLimitCost(1.0, -np.inf, 1.0), "lower.0. is -inf"),
+        (lambda: ManipulabilityCost(1.0, 0.0), "influence = 0.0"),
+    ],
+)
+def test_bad_posture_costs(make: Any, message: str) -> None:
+    with pytest.raises(ProblemError, match=message):
+        make()
+
+
 # -- bad input ----------------------------------------------------------------------
 
 
@@ -235,6 +347,24 @@ def far_path(t: ca.SX) -> ca.SX:
         ({"clearance": 0.2}, "there are no obstacles"),
         ({"clearance": 0.0, "obstacles": [ARM_001.disc]}, "clearance = 0.0"),
         ({"obstacles": [ARM_001.disc]}, "need a distance_cost or a clearance"),
+        ({"obstacles": ARM_001.disc, "clearance": 0.2}, r"put it into a tuple: \(Disc"),
+        ({"obstacles": [(1.6, 0.7)], "clearance": 0.2}, r"obstacles\[0\] is a tuple, Obstacle"),
+        ({"obstacles": [ARM_001.disc], "clearance": [0.2, 0.3]}, "clearance has 2 entries"),
+        ({"obstacles": [TRIANGLE], "clearance": -0.1}, "clearance = -0.1, it must be >= 0"),
+        ({"obstacles": [Disc([0.1, 0.1], 0.2)], "clearance": 0.2}, "covers the base of the arm at"),
+        (
+            {"obstacles": [TRIANGLE.moved([0.0, 0.4])], "clearance": 0.0},
+            r"Polygon\) covers the base",
+        ),
+        (
+            {"obstacles": [TRIANGLE.moved([0.6, 1.0])], "clearance": 0.0},
+            "start is inside it: link 1",
+        ),
+        ({"obstacles": [ARM_001.disc], "distance_cost": 100.0}, "distance_cost is a float"),
+        ({"posture_costs": [1.0]}, r"posture_costs\[0\] is a float, PostureCost is needed"),
+        ({"posture_costs": [JointLimitCost(1.0, [-1, -1], [1, 1])]}, "2 limits, the arm has 3"),
+        ({"velocity_bounds": (-1.0, 1.0)}, "velocity_bounds is a tuple, Box is needed"),
+        ({"joint_bounds": (-1.0, 1.0)}, "joint_bounds is a tuple, Box is needed"),
         ({"path": line([0.5, 0.5], [0.0, 0.0])}, "the path starts .* m away from the end effector"),
         ({"path": far_path}, r"leaves the workspace at t = 0\.\d+ s: 3\.\d+ m from the base"),
         ({"path": lambda t: ca.SX.sym("where", 2)}, "path contains where_0, where_1, neither t"),

@@ -1,0 +1,1 @@
+"""Inverse kinematics from instant to instant, in the order of priority."""
