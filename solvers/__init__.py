@@ -4,8 +4,13 @@ from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
+from solvers.indirect.enumerate_extremals import Enumeration, enumerate_extremals
 from solvers.indirect.indirect_shooting import IndirectShooting
+from solvers.indirect.manifold import Kept, Manifold
+from solvers.indirect.reverse_shooting import ReverseShooting
+from solvers.indirect.scan import Scan
 from solvers.indirect.second_order import SecondOrder, second_order
+from solvers.indirect.self_motion import SelfMotion, seeds_around, self_motions
 from solvers.linear.batch import Batch
 from solvers.linear.linear_mpc import LinearMPC
 from solvers.linear.riccati import Riccati
@@ -23,6 +28,7 @@ __all__ = [
     "Armijo",
     "Axis",
     "Batch",
+    "Enumeration",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
@@ -30,17 +36,25 @@ __all__ = [
     "GridDP",
     "HorizonContinuation",
     "IndirectShooting",
+    "Kept",
     "LinearMPC",
     "LocalOptimum",
+    "Manifold",
     "MultipleShooting",
     "ParameterContinuation",
+    "ReverseShooting",
     "Riccati",
+    "Scan",
     "Schuetz",
     "SecondOrder",
+    "SelfMotion",
     "StepRule",
     "Table",
+    "enumerate_extremals",
     "gpc_loop",
     "multistart",
     "polish",
     "second_order",
+    "seeds_around",
+    "self_motions",
 ]
