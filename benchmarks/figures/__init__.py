@@ -1,12 +1,15 @@
-"""The figures of chapter 2 of the thesis, each drawn from results computed for it."""
+"""The figures of the thesis, each drawn from results computed for it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figures import (
+    basin,
+    boundary_types,
     constrained,
     dynamic_programming,
+    extremals,
     free_and_forced,
     horizon_map,
     interval,
@@ -21,7 +24,7 @@ class Figure:
     """A figure of the thesis.
 
     Attributes:
-        number: as the thesis has it.
+        number: as the thesis has it, or a name where it has none.
         about: what it shows, in a few words.
         draw: computes and draws it.
     """
@@ -48,6 +51,11 @@ FIGURES = (
     Figure("2.12", "approaching the constraint", constrained.approach),
     Figure("2.13", "a smaller interval", interval.smaller_steps),
     Figure("2.14", "horizon and interval", horizon_map.horizon_and_interval),
+    Figure("3.8", "the self-motion at t1", boundary_types.self_motion),
+    Figure("3.9", "type 3 without obstacle", boundary_types.free_start),
+    Figure("3.10", "types 3 and 4 with an obstacle", extremals.with_obstacle),
+    Figure("3.11", "type 4 without obstacle", boundary_types.given_start),
+    Figure("basin", "the basins of single shooting", basin.basins),
 )
 
 
