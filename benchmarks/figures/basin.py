@@ -66,7 +66,7 @@ def basins() -> Drawing:
     image = right.imshow(steps, origin="lower", extent=box, aspect="auto", cmap="viridis_r")
     picture.colorbar(image, ax=right, location="bottom", label="Newton steps")
     for axes, title in ((left, "where Newton ends"), (right, "in how many steps")):
-        _marks(axes, known[0] @ across, (_GUESS @ across, _GUESS @ up))
+        _marks(axes, float(known[0] @ across), (float(_GUESS @ across), float(_GUESS @ up)))
         label(
             axes,
             "ψ(t_0) along the optimal one [rad/s]",
@@ -83,7 +83,8 @@ def basins() -> Drawing:
         f"{len(np.unique(kind[(kind >= 0) & (kind < len(known))]))} of the {len(known)} extremals "
         f"of the scan are met, and {new} runs end in one it has not. The stripes run along the "
         f"row space of J, where ψ(t_0) does nothing and Newton needs one step. Chosen here: "
-        f"{_SCENARIO}, p_0 summed, undamped Newton with Algorithm 1 (δ = {_DELTA:g}), {_STEPS} steps of RK4."
+        f"{_SCENARIO}, p_0 summed, undamped Newton with Algorithm 1 (δ = {_DELTA:g}), {_STEPS} "
+        "steps of RK4."
     )
     data = {"ψ along [rad/s]": a.ravel(), "ψ across [rad/s]": b.ravel()}
     data |= {

@@ -77,7 +77,7 @@ def given_start() -> Drawing:
     """Draw cost and distance from the given start of type 4 over the end configuration."""
     found = _found(free=False)
     (scan,) = found.scans
-    ocp = _bare(free_start=False)
+    ocp, best = _bare(free_start=False), found.costs[0]
     away = np.linalg.norm(
         scan.curve.manifold.periods.wrapped(scan.starts - np.asarray(ocp.x0)), axis=1
     )
@@ -88,7 +88,7 @@ def given_start() -> Drawing:
     rows(axes, scan, away, "‖θ_int − θ_0‖ [rad]", found)
     sentence = (
         f"Fig. 3.11: the start is met by {_number(found)} end configuration"
-        f"{'s' if len(found.solutions) > 1 else ''}, at cost {found.solutions[0].cost:.6f}; the "
+        f"{'s' if len(found.solutions) > 1 else ''}, at cost {best:.6f}; the "
         f"cost curve says nothing there, its minima ({scan.costs.min():.6f}) belong to other "
         f"starts. ReverseShooting of type 4 takes {solution.iterations} Newton steps to "
         f"{solution.cost:.9f}, direct multiple shooting says {direct.cost:.9f}. {_CHOSEN}."
