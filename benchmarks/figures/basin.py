@@ -81,7 +81,7 @@ def basins() -> Drawing:
         f"optimum, {100 * shares[2]:.0f} % to another minimum, {100 * shares[1]:.0f} % to an "
         f"extremal that is none, and {100 * shares[0]:.0f} % nowhere within {_MOST_STEPS} steps; "
         f"{len(np.unique(kind[(kind >= 0) & (kind < len(known))]))} of the {len(known)} extremals "
-        f"of the scan are met, and {new} runs end in one it has not. The stripes run along the "
+        f"of the scan are met, and {new} converged elsewhere. The stripes run along the "
         f"row space of J, where ψ(t_0) does nothing and Newton needs one step. Chosen here: "
         f"{_SCENARIO}, p_0 summed, undamped Newton with Algorithm 1 (δ = {_DELTA:g}), {_STEPS} "
         "steps of RK4."
