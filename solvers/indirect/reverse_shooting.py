@@ -25,6 +25,7 @@ from ocp import (
     instance,
     whole,
 )
+from solvers.indirect.boundary import refuse_what_reverse_cannot, transversality
 from solvers.indirect.chart import Chart
 from solvers.indirect.extremal import Paths, Schedule
 from solvers.indirect.manifold import Kept, Manifold, out_of_reach
@@ -104,21 +105,7 @@ class ReverseShooting(Solver):
             )
         kept = Kept.of(ocp)
         reverse = Reverse.of(ocp, self.steps, self.integrator)
-        return ReverseShootingProgram(self, reverse, kept, _transversality(ocp))
-
-
-def refuse_what_reverse_cannot(ocp: OCP) -> None:
-    """Raise for terms that a reverse integration has no place for.
-
-    Raises:
-        UnsupportedProblem: naming the term.
-    """
-    for c in ocp.at("path"):
-        raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no path '{c.name}'")
-    if ocp.state_bounds.is_active:
-        raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no state bounds")
-    if ocp.has_free_time:
-        raise UnsupportedProblem(f"{ocp.name}: reverse integration needs a fixed final time")
+        return ReverseShootingProgram(self, reverse, kept, transversality(ocp))
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,22 +287,3 @@ class _Task:
             cost=cost,
             parameters=self.data.values.as_dict(),
         )
-
-
-def _transversality(ocp: OCP) -> ca.Function:
-    """(z, t, p) -> (c, N psi) of the initial constraints and its derivative in z."""
-    m = ocp.model
-    c = ca.vertcat(
-        *[entry.expression - ca.DM(np.asarray(entry.lower)) for entry in ocp.at("initial")]
-    )
-    costate = ca.SX.sym("costate", m.nx)
-    tangential = costate
-    if c.numel():
-        slope = ca.jacobian(c, m.x)
-        gram = ca.mtimes(slope, slope.T)
-        tangential = costate - ca.mtimes(slope.T, ca.solve(gram, ca.mtimes(slope, costate)))
-    z = ca.vertcat(m.x, costate)
-    value = ca.densify(ca.vertcat(c, tangential))
-    return ca.Function(
-        "transversality", [z, m.t, ocp.p], [value, ca.densify(ca.jacobian(value, z))]
-    )
