@@ -24,6 +24,7 @@ def test_without_obstacle_there_is_one_extremal() -> None:
     assert abs(found.costs[0] - direct) <= SAME_COST * (1.0 + direct)
 
 
+@pytest.mark.slow
 def test_a_free_start_has_minima_and_maxima_in_turn() -> None:
     found = enumerate_extremals(bare(free_start=True), keep=None)
     (scan,) = found.scans
@@ -38,6 +39,7 @@ def test_a_free_start_has_minima_and_maxima_in_turn() -> None:
     assert found.costs[0] >= scan.costs.min() - 1e-3
 
 
+@pytest.mark.slow
 def test_the_scan_is_the_same_every_time_and_fine_where_it_says_so() -> None:
     one, other = (enumerate_extremals(bare(), keep=1) for _ in range(2))
     np.testing.assert_array_equal(one.scans[0].starts, other.scans[0].starts)
