@@ -4,8 +4,13 @@ from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
+from solvers.indirect.enumerate_extremals import Enumeration, enumerate_extremals
 from solvers.indirect.indirect_shooting import IndirectShooting
+from solvers.indirect.manifold import Kept, Manifold
+from solvers.indirect.reverse_shooting import ReverseShooting
+from solvers.indirect.scan import Scan
 from solvers.indirect.second_order import SecondOrder, second_order
+from solvers.indirect.self_motion import SelfMotion, seeds_around, self_motions
 from solvers.kinematic.hierarchy import Level, prioritised_velocity
 from solvers.kinematic.prioritised import PrioritisedKinematics
 from solvers.kinematic.program import KinematicProgram
@@ -31,6 +36,7 @@ __all__ = [
     "Axis",
     "Batch",
     "Damped",
+    "Enumeration",
     "Exact",
     "Filtered",
     "FixedStep",
@@ -41,22 +47,28 @@ __all__ = [
     "HorizonContinuation",
     "IndirectShooting",
     "Inverse",
+    "Kept",
     "KinematicProgram",
     "KinematicRun",
     "Level",
     "LinearMPC",
     "LocalOptimum",
+    "Manifold",
     "MultipleShooting",
     "ParameterContinuation",
     "PrioritisedKinematics",
     "Repulsion",
+    "ReverseShooting",
     "Riccati",
+    "Scan",
     "Schuetz",
     "SecondOrder",
+    "SelfMotion",
     "StepRule",
     "Table",
     "Task",
     "descend",
+    "enumerate_extremals",
     "gpc_loop",
     "multistart",
     "polish",
@@ -64,5 +76,7 @@ __all__ = [
     "random_guesses",
     "repel",
     "second_order",
+    "seeds_around",
+    "self_motions",
     "track",
 ]

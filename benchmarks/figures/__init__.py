@@ -5,10 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.figures import (
+    basin,
+    boundary_types,
     constrained,
     descent,
     descent_gap,
     dynamic_programming,
+    extremals,
     free_and_forced,
     horizon_map,
     instantaneous,
@@ -25,7 +28,7 @@ class Figure:
     """A figure of the thesis.
 
     Attributes:
-        number: as the thesis has it.
+        number: as the thesis has it, or a name where it has none.
         about: what it shows, in a few words.
         draw: computes and draws it.
     """
@@ -55,11 +58,16 @@ FIGURES = (
     Figure("3.3", "gains of the repulsive velocity", instantaneous.gains),
     Figure("3.4", "null-space motion past an obstacle", instantaneous.avoidance),
     Figure("3.6", "Newton's steps in single shooting", newton_steps.convergence),
+    Figure("3.8", "the self-motion at t1", boundary_types.self_motion),
+    Figure("3.9", "type 3 without obstacle", boundary_types.free_start),
+    Figure("3.10", "types 3 and 4 with an obstacle", extremals.with_obstacle),
+    Figure("3.11", "type 4 without obstacle", boundary_types.given_start),
     Figure("3.12", "convergence of Schuetz' method", descent.convergence),
     Figure("3.13", "its climb, with the tests off", descent.climb),
     Figure("3.13a", "what makes it climb", descent.causes),
     Figure("3.13b", "its gap over the step length", descent_gap.over_step),
     Figure("3.13c", "its gap over the start", descent_gap.over_start),
+    Figure("basin", "the basins of single shooting", basin.basins),
 )
 
 

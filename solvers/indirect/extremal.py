@@ -69,6 +69,18 @@ class Schedule:
             p_last=data.values.at(share)[0],
         )
 
+    def reversed(self) -> "Schedule":
+        """Return the same schedule from the end to the start: its steps go back in time."""
+        return Schedule(
+            t0=self.t0 + self.duration,
+            duration=-self.duration,
+            fractions=1.0 - self.fractions[::-1],
+            p_left=self.p_right[::-1],
+            p_right=self.p_left[::-1],
+            p_first=self.p_last,
+            p_last=self.p_first,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -207,6 +219,13 @@ class Extremals:
         u = control(z[:, :nx].T, z[:, nx:].T, t[None, :], p.T)
         return t, z[:, :nx], z[:, nx:], np.array(u).T
 
+    def still(self, x0: np.ndarray, schedule: Schedule) -> tuple[np.ndarray, ...]:
+        """Return a finite t, x, costate and u that stand still, where there is none to return."""
+        ocp, nodes = self.ocp, schedule.fractions
+        u = ocp.control_bounds.clip(np.zeros((len(nodes), ocp.model.nu)))
+        x = np.tile(x0, (len(nodes), 1))
+        return schedule.t0 + nodes * ocp.duration, x, np.zeros_like(x), u
+
     # -- pieces ----------------------------------------------------------------------------
 
     def _inputs(self, schedule: Schedule, duration: float) -> list:
@@ -244,8 +263,10 @@ def _step(
     end = integrator(rate, ca.vertcat(z, 0), 0.0, 1.0)
     inputs = [z, duration, t0, fraction, share, p0, p1]
     names = ["z", "T", "t0", "fraction", "share", "p0", "p1"]
-    step = ca.Function("step", inputs, [end[: 2 * nx], end[2 * nx]], names, ["z_next", "cost"])
     derivatives = [ca.densify(ca.jacobian(end[: 2 * nx], v)) for v in (z, duration)]
+    if kind is ca.SX:  # flow and cost share most of what they compute: half of a step's time
+        end, derivatives = ca.cse([end])[0], ca.cse(derivatives)
+    step = ca.Function("step", inputs, [end[: 2 * nx], end[2 * nx]], names, ["z_next", "cost"])
     return step, ca.Function("slope", inputs, derivatives, names, ["in_z", "in_T"])
 
 

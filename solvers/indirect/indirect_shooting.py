@@ -241,7 +241,7 @@ class IndirectShootingProgram(Program):
         if not all(np.isfinite(a).all() for a in (t, x, costate, u, cost)) or duration <= 0.0:
             status = Status.DIVERGED
             message = message or "the cost is not finite along the extremal"
-            t, x, costate, u = self._still(data)
+            t, x, costate, u = ext.still(data.x0, schedule)
             cost = np.inf
         elif status is Status.STATIONARY and ext.ocp.time_box.excess(np.array([duration]))[0] > 0.0:
             status = Status.FAILED
@@ -273,13 +273,6 @@ class IndirectShootingProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
-
-    def _still(self, data: Data) -> tuple[np.ndarray, ...]:
-        """Return a finite trajectory that stands still, where there is none to return."""
-        ocp, nodes = self.extremals.ocp, self.schedule(data).fractions
-        u = ocp.control_bounds.clip(np.zeros((len(nodes), ocp.model.nu)))
-        x = np.tile(data.x0, (len(nodes), 1))
-        return data.t0 + nodes * ocp.duration, x, np.zeros_like(x), u
 
     def _verdict(self, results: list[NewtonResult]) -> tuple[Status, str]:
         last = results[-1]

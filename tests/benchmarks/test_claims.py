@@ -35,6 +35,8 @@ def row(**changes) -> Row:
         ("polish", {"residual": 1e-9, "gap": 0.0}),
         ("polish", {"iterations": 4, "gap": 0.0}),
         ("polish", {"status": "STATIONARY", "gap": 0.0}),
+        ("extremals", {"gap": 2e-6}),
+        ("extremals", {"solved": False}),
         ("schuetz-sound", {"local_gap": 2e-3}),
         ("indirect-15", {"optimum": False}),
     ],
