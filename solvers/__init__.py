@@ -1,5 +1,7 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
+from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
+from solvers.constrained.between_nodes import BetweenNodes
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
@@ -21,8 +23,10 @@ from solvers.tabular.grid_dp import GridDP
 __all__ = [
     "GPC",
     "Armijo",
+    "AugmentedLagrangian",
     "Axis",
     "Batch",
+    "BetweenNodes",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
