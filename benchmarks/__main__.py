@@ -14,7 +14,8 @@ from benchmarks.claims import below_reference, claims_of
 from benchmarks.extremes import extremes_table
 from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.jacobians import jacobian_table
-from benchmarks.methods import Method, Settings, all_methods
+from benchmarks.method import Method, Settings
+from benchmarks.methods import all_methods
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
 from benchmarks.sweep import sweep, tasks_of

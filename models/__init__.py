@@ -3,6 +3,7 @@
 from models.arm import PlanarArm
 from models.carima import Carima, CarimaPlant
 from models.carima_ocp import carima_ocp
+from models.dilemma import BarrierCost, bounded_ocp, unbounded_ocp
 from models.distance_cost import Combine, DistanceCost
 from models.double_integrator import (
     bryson_denham,
@@ -31,6 +32,7 @@ from models.scenarios import ArmScenario, Difficulty, random_scenarios
 
 __all__ = [
     "ArmScenario",
+    "BarrierCost",
     "Carima",
     "CarimaPlant",
     "Combine",
@@ -42,6 +44,7 @@ __all__ = [
     "LinearPlant",
     "Path",
     "PlanarArm",
+    "bounded_ocp",
     "bryson_denham",
     "carima_ocp",
     "discrete_double_integrator",
@@ -65,6 +68,7 @@ __all__ = [
     "thesis_regulator",
     "thesis_tracking",
     "tracking_ocp",
+    "unbounded_ocp",
     "unstable_plant",
     "van_der_pol",
 ]

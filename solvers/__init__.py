@@ -2,6 +2,7 @@
 
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
+from solvers.constrained.raised import raise_until_clear
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
@@ -46,5 +47,6 @@ __all__ = [
     "gpc_loop",
     "multistart",
     "polish",
+    "raise_until_clear",
     "second_order",
 ]
