@@ -22,8 +22,8 @@ _TRAJECTORY = 1e-2
 # A violation that a round leaves this much of creeps; how far inside, in multiples of it, one
 # may then aim. What that costs is part of the gap.
 _CREEPING, _FURTHEST = 0.75, 3.0
-# Multipliers whose term exceeds the cost itself push against something that does not yield.
-_OUTGROWN = 1.0
+# Multipliers whose term is of the order of the cost push against something that does not yield.
+_OUTGROWN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,20 +150,27 @@ class Ascent:
             return None
         if feasible and here.gap <= s.complementarity:
             return here.inner.status, here.inner.message
-        return self._infeasible_or(Status.NO_PROGRESS)
+        if here.inner.status.is_success:
+            return self._infeasible_or(Status.NO_PROGRESS)
+        return self._failed(here)
 
     def _failed(self, here: Round) -> tuple[Status, str]:
         status = here.inner.status
         status, message = self._infeasible_or(Status.FAILED if status.is_success else status)
-        why = f"the inner solver at penalty {here.used.penalty:.3g}: {here.inner.message}"
+        if status is Status.INFEASIBLE:
+            return status, message
+        why = f"the inner solver ends with {here.inner.status.name} at penalty "
+        why = f"{why}{here.used.penalty:.3g} {here.inner.message}".strip()
         return status, f"{message}; {why}" if message else why
 
     def _infeasible_or(self, otherwise: Status) -> tuple[Status, str]:
         best = self.best
         if best is None or best.violation <= self.solver.tolerance:
             return otherwise, ""
+        # A solver that mostly fails has shown nothing about the problem.
+        solved = sum(r.inner.status.is_success for r in self.rounds) >= len(self.rounds) / 2
         outgrown = self.rounds[-1].gap > _OUTGROWN
-        return Status.INFEASIBLE if outgrown else otherwise, self._where(best)
+        return Status.INFEASIBLE if outgrown and solved else otherwise, self._where(best)
 
     def _start_is_outside(self, here: Round) -> bool:
         """Whether the given start violates a row that only the start decides."""

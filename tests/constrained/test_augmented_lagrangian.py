@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -154,20 +153,14 @@ def test_start_that_violates_is_called_infeasible_at_once() -> None:
 
 
 def test_equation_along_the_path() -> None:
-    """x^2 + y^2 = 1 with a motor along x alone is kept by the velocity on the circle."""
-    x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)
-    ocp = replace(
-        point(),
-        model=replace(point().model, x=x, u=u, f=u, x_units=(), u_units=()),
-        x0=[1.0, 0.0],
-        running_cost=ca.sumsqr(u) + (x[1] - 1.0) ** 2,
-        constraints=(Constraint("circle", ca.sumsqr(x), 1.0, 1.0),),
-    )
-    direct = solve(ocp, MultipleShooting(N))
-    solver = AugmentedLagrangian(Schuetz.sound(intervals=N), intervals=N, tolerance=1e-3)
+    """Along x = t the control is 1: cost 1, though the cost alone would stay at 0."""
+    ocp = point(constraints=lambda x, u: (Constraint("rail", u, 1.0, 1.0),))
+    solver = AugmentedLagrangian(Schuetz.sound(intervals=N), intervals=N)
     solution = solve(ocp, solver)
     assert solution.status.is_success, solution.message
-    assert evaluate(solution).cost == pytest.approx(direct.cost, rel=1e-2)
+    assert evaluate(solution).cost == pytest.approx(1.0, rel=1e-5)
+    # H_u = 2 u + mu = 0.
+    assert solution.history["multiplier"] == pytest.approx(-2.0, rel=1e-3)
 
 
 @pytest.mark.slow

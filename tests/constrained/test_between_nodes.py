@@ -59,7 +59,7 @@ def test_infeasible_stays_infeasible() -> None:
 
 def test_what_is_refused() -> None:
     with pytest.raises(UnsupportedProblem, match="discrete"):
-        BetweenNodes().build(discrete_double_integrator())
+        BetweenNodes().build(discrete_double_integrator(steps=10, dt=0.1))
     with pytest.raises(ProblemError, match="inner"):
         BetweenNodes(Schuetz.sound())  # pyright: ignore[reportArgumentType]
     with pytest.raises(ProblemError):
