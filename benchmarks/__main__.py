@@ -69,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="the main job: six scenarios, a table, a picture")
     for command in (run, bench):
         command.add_argument("--workers", type=_positive, default=2, metavar="W")
-    figures = commands.add_parser("figures", help="figures of chapter 2, with their data")
+    figures = commands.add_parser("figures", help="figures of the thesis, with their data")
     known = ", ".join(figure.number for figure in FIGURES)
     figures.add_argument("numbers", nargs="*", metavar="NUMBER", help=f"of {known}; none: all")
     for command in (run, bench, figures):

@@ -29,6 +29,7 @@ from models.oscillators import hypersensitive, rayleigh, van_der_pol
 from models.paths import Path, line, path_position, path_velocity
 from models.redundancy import Cost, Form, redundancy_ocp
 from models.scenarios import ArmScenario, Difficulty, random_scenarios
+from models.seven_links import seven_links
 
 __all__ = [
     "ArmScenario",
@@ -61,6 +62,7 @@ __all__ = [
     "random_scenarios",
     "rayleigh",
     "redundancy_ocp",
+    "seven_links",
     "sinusoid",
     "stable_plant",
     "state_space",

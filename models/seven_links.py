@@ -12,13 +12,14 @@ ARM = PlanarArm((0.5,) * 7)
 THETA0 = (2.2, -0.55, -0.55, -0.55, -0.45, -0.45, -0.35)
 VELOCITY = (0.5, -0.5)  # of the end effector [m/s]
 HORIZON = 1.5  # [s]
-DISCS = (Disc((0.44, 0.94), 0.12), Disc((1.36, 0.99), 0.12), Disc((2.17, 0.52), 0.12))
-# Without limits the first joint would turn to 1.76, the second to -0.77 [rad].
-LIMITS = Box([1.85, -0.7, -1.0, -1.0, -1.0, -1.0, -1.0], [2.6, 0.2, 0.2, 0.2, 0.2, 0.2, 0.2])
+# Their centres are 0.08 to 0.09 m from links 3, 5 and 7 of the unhindered end configuration.
+DISCS = (Disc((0.44, 0.94), 0.06), Disc((1.36, 0.99), 0.06), Disc((2.17, 0.52), 0.06))
+# With a clearance of 0.095 m alone the third joint would turn to -0.58 [rad].
+LIMITS = Box([1.4, -1.2, -0.57, -1.2, -1.2, -1.2, -1.2], [2.6, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3])
 
 
 def seven_links(
-    *, gain: float = 0.0, clearance: float | None = 0.12, joint_bounds: Box | None = LIMITS
+    *, gain: float = 0.0, clearance: float | None = 0.095, joint_bounds: Box | None = LIMITS
 ) -> OCP:
     """Return the problem; the end effector goes down a slope over the discs.
 

@@ -1,4 +1,4 @@
-"""The figures of chapter 2 of the thesis, each drawn from results computed for it."""
+"""The figures of the thesis, each drawn from results computed for it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from benchmarks.figures import (
     constrained,
+    dilemma,
     dynamic_programming,
     free_and_forced,
     horizon_map,
@@ -48,6 +49,7 @@ FIGURES = (
     Figure("2.12", "approaching the constraint", constrained.approach),
     Figure("2.13", "a smaller interval", interval.smaller_steps),
     Figure("2.14", "horizon and interval", horizon_map.horizon_and_interval),
+    Figure("3.16", "the cost function dilemma", dilemma.costs),
 )
 
 

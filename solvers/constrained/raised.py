@@ -31,8 +31,9 @@ def raise_until_clear(
 ) -> Solution:
     """Solve a soft problem again and again, its price raised until a hard one is kept.
 
-    The program is built once; each run starts from the last answer. Clear is what the
-    *referee* finds clear, between the nodes too. The price buys distance, so the answer costs
+    The program is built once. Every run starts from the same guess: from a motion through the
+    obstacle a higher price leads to another one through it. Clear is what the *referee* finds
+    clear, between the nodes too. The price buys distance, so the answer costs
     more than the optimum of the hard problem; ``AugmentedLagrangian`` finds that one.
     Source: thesis 3.3, the penalty method [Nocedal & Wright 2006, 17.1].
 
@@ -44,7 +45,7 @@ def raise_until_clear(
         factor: by which it is raised.
         tolerance: on the violation of ``hard``.
         most: runs.
-        guess: where the first run starts.
+        guess: where every run starts.
 
     Returns:
         the last answer, as a solution of ``soft``; the price is in ``parameters``, and the
@@ -65,17 +66,19 @@ def raise_until_clear(
     program, price = solver.build(soft), known[parameter].value
     runs: list[Solution] = []
     violations: list[float] = []
+    worst = ""
     while len(runs) < most:
-        run = program.run(parameters={parameter: price}, guess=runs[-1] if runs else guess)
+        run = program.run(parameters={parameter: price}, guess=guess)
         verdict = evaluate(run.with_(problem=hard, parameters={}, control_kind=_kind(run)))
         runs, violations = [*runs, run], [*violations, verdict.violation]
+        worst = verdict.worst
         if not run.status.is_success or verdict.violation <= tolerance:
             break
         price = factor * np.asarray(price)
     last, status, message = runs[-1], runs[-1].status, runs[-1].message
     if status.is_success and violations[-1] > tolerance:
         status = Status.INFEASIBLE
-        message = f"{verdict.worst} is violated by {violations[-1]:.3g} at any price"
+        message = f"{worst} is violated by {violations[-1]:.3g} at any price"
     return last.with_(
         status=status,
         message=message,

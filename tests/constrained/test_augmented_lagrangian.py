@@ -200,7 +200,7 @@ def test_what_is_refused() -> None:
         {"penalty": np.nan},
     ):
         with pytest.raises(ProblemError):
-            AugmentedLagrangian(Schuetz.sound(), **bad)
+            AugmentedLagrangian(Schuetz.sound(), **bad)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_failing_inner_solver_is_named() -> None:
