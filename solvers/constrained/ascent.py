@@ -1,6 +1,6 @@
 """Round by round towards the multipliers: the loop of the augmented Lagrangian."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,9 +88,9 @@ class Ascent:
             here = self._round(there, guess)
             if not here.is_trajectory:
                 self.lost, retreats = here, retreats + 1
-                if not self.rounds or retreats > _RETREATS:
+                if retreats > _RETREATS:
                     return self._failed(here)
-                there = self.rounds[-1].used.halfway(there)
+                there = self._retreat(there)
                 continue
             retreats, guess = 0, here.inner
             stalled = 0 if self._improves(here) else stalled + 1
@@ -100,6 +100,12 @@ class Ascent:
                 return decided
             there = self._next(here)
         return self._infeasible_or(Status.ITERATION_LIMIT)
+
+    def _retreat(self, lost: Multipliers) -> Multipliers:
+        """Go halfway back to the last round; before the first one, a lower penalty."""
+        if self.rounds:
+            return self.rounds[-1].used.halfway(lost)
+        return replace(lost, penalty=lost.penalty / self.solver.growth)
 
     def _round(self, used: Multipliers, guess: Start | None) -> Round:
         program, relaxed, data = self.program, self.program.relaxed, self.data
