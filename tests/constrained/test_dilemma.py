@@ -63,6 +63,6 @@ def test_what_is_refused() -> None:
     for bad in ({"parameter": "price"}, {"factor": 1.0}, {"most": 0}):
         options = {"parameter": "weight", **bad}
         with pytest.raises(ProblemError):
-            raise_until_clear(soft, HARD, Schuetz.sound(), **options)
+            raise_until_clear(soft, HARD, Schuetz.sound(), **options)  # pyright: ignore
     with pytest.raises(ProblemError):
         BarrierCost(0.0, 0.5)
