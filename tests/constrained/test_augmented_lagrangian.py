@@ -131,7 +131,22 @@ def test_relaxed_problem_is_honest_about_its_smoothness() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("inner", INNER, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(
+    "inner",
+    [
+        INNER[0],
+        pytest.param(
+            INNER[1],
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason="conjugate gradients end at their iteration limit in most rounds, and "
+                "a solver that mostly fails is not believed: the status is ITERATION_LIMIT",
+            ),
+        ),
+        INNER[2],
+    ],
+    ids=lambda s: type(s).__name__,
+)
 def test_no_clear_path(inner: Solver) -> None:
     """x must be above t / 2 and below 0.2: nothing can be from t = 0.4 s on."""
     ocp = under_a_ceiling()
