@@ -16,7 +16,8 @@ from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.greedy_gap import greedy_table
 from benchmarks.jacobians import jacobian_table
 from benchmarks.linear_speed import HORIZONS
-from benchmarks.methods import Method, Settings, all_methods
+from benchmarks.method import Method, Settings
+from benchmarks.methods import all_methods
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
 from benchmarks.speed_tables import print_speed

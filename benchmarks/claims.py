@@ -1,24 +1,16 @@
 """What the toolkit claims of itself, checked against the rows of a run."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from statistics import median
 
+from benchmarks.claim import Claim
+from benchmarks.clearance_claims import clearance_claims
 from benchmarks.row import Row
 
 # A trajectory that violates a constraint by more may gain by it.
 FEASIBLE = 1e-6
 # A referee's cost this far below a reference, relative: the reference is wrong.
 BELOW_REFERENCE = 1e-6
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A sentence with a number in it, and whether the rows bear it out."""
-
-    text: str
-    holds: bool
-    evidence: str
 
 
 def below_reference(rows: Iterable[Row]) -> tuple[Row, ...]:
@@ -37,7 +29,7 @@ def below_reference(rows: Iterable[Row]) -> tuple[Row, ...]:
 
 
 def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
-    """Return the claims on the suite ``arm`` that these rows can decide."""
+    """Return the claims on the suites ``arm`` and ``clearance`` that these rows can decide."""
     every = {name: _of(rows, name) for name in dict.fromkeys(row.solver for row in rows)}
     found = [
         _gap_claim(every.get("direct-75", ())),
@@ -47,7 +39,7 @@ def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
         _basin_claim(every.get("schuetz-sound", ())),
         _multiple_claim(every.get("indirect-15", ())),
     ]
-    return tuple(claim for claim in found if claim is not None)
+    return (*(claim for claim in found if claim is not None), *clearance_claims(rows))
 
 
 def _of(rows: Sequence[Row], solver: str) -> tuple[Row, ...]:

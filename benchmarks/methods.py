@@ -1,12 +1,13 @@
 """What is compared: each method is a solver with the start it is given."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter
 
 from benchmarks.cases import Case, Family
-from ocp import OCP, Evaluation, Guess, Solution, Solver, Status, evaluate, solve
+from benchmarks.clearance import clearance_methods
+from benchmarks.method import Method, Outcome, Settings
+from ocp import OCP, Guess, Solution, Solver, Status, evaluate, solve
 from solvers import (
     FixedStep,
     IndirectShooting,
@@ -25,56 +26,6 @@ ROOTS = 12
 SHOOTING_STEPS = 150
 # The thesis' first guess of psi(t0), in the sign of the minimum principle.
 THESIS_GUESS = (0.0, 10.0, -10.0)
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What a sweep sets for all methods.
-
-    Attributes:
-        starts: of the multi-start.
-        seed: of everything random.
-    """
-
-    starts: int = 10
-    seed: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a method returned.
-
-    Attributes:
-        solution: its answer.
-        verdict: the referee's, where it is not the usual one.
-        local_gap: how far the referee's cost lies above the local optimum that direct multiple
-            shooting reaches from this answer, relative; None where that is not asked.
-    """
-
-    solution: Solution
-    verdict: Evaluation
-    local_gap: float | None = None
-
-
-@dataclass(frozen=True)
-class Method:
-    """A row of the comparison.
-
-    Attributes:
-        name: what the tables call it.
-        family: which cases it runs on: those that declare the family.
-        suites: the suites it belongs to.
-        run: (case, settings) -> outcome.
-        settings: its options, as text, for the record.
-        about: one line for ``list``.
-    """
-
-    name: str
-    family: Family
-    suites: frozenset[str]
-    run: Callable[[Case, Settings], Outcome]
-    settings: str
-    about: str
 
 
 @lru_cache(maxsize=4)
@@ -167,7 +118,13 @@ def _method(
 
 def all_methods() -> tuple[Method, ...]:
     """Return every method, in the order of the tables."""
-    return (*_direct_methods(), *_gradient_methods(), *_single_shooting(), *_multiple_shooting())
+    return (
+        *_direct_methods(),
+        *_gradient_methods(),
+        *_single_shooting(),
+        *_multiple_shooting(),
+        *clearance_methods(),
+    )
 
 
 def _direct_methods() -> tuple[Method, ...]:

@@ -4,6 +4,7 @@ from models.arm import PlanarArm
 from models.avoidance import clearance_constraint
 from models.carima import Carima, CarimaPlant
 from models.carima_ocp import carima_ocp
+from models.dilemma import BarrierCost, bounded_ocp, unbounded_ocp
 from models.distance_cost import Combine, DistanceCost
 from models.distances import distance_to_segment, signed_distance
 from models.double_integrator import (
@@ -39,9 +40,11 @@ from models.posture_cost import (
 )
 from models.redundancy import Cost, Form, redundancy_ocp
 from models.scenarios import ArmScenario, Difficulty, random_scenarios
+from models.seven_links import seven_links
 
 __all__ = [
     "ArmScenario",
+    "BarrierCost",
     "Capsule",
     "Carima",
     "CarimaPlant",
@@ -59,6 +62,7 @@ __all__ = [
     "PlanarArm",
     "Polygon",
     "PostureCost",
+    "bounded_ocp",
     "bryson_denham",
     "carima_ocp",
     "clearance_constraint",
@@ -77,6 +81,7 @@ __all__ = [
     "random_scenarios",
     "rayleigh",
     "redundancy_ocp",
+    "seven_links",
     "signed_distance",
     "sinusoid",
     "squared_manipulability",
@@ -86,6 +91,7 @@ __all__ = [
     "thesis_regulator",
     "thesis_tracking",
     "tracking_ocp",
+    "unbounded_ocp",
     "unstable_plant",
     "van_der_pol",
 ]

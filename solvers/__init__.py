@@ -1,5 +1,8 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
+from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
+from solvers.constrained.between_nodes import BetweenNodes
+from solvers.constrained.raised import raise_until_clear
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
@@ -33,8 +36,10 @@ from solvers.tabular.grid_dp import GridDP
 __all__ = [
     "GPC",
     "Armijo",
+    "AugmentedLagrangian",
     "Axis",
     "Batch",
+    "BetweenNodes",
     "Damped",
     "Enumeration",
     "Exact",
@@ -73,6 +78,7 @@ __all__ = [
     "multistart",
     "polish",
     "prioritised_velocity",
+    "raise_until_clear",
     "random_guesses",
     "repel",
     "second_order",

@@ -2,13 +2,25 @@
 
 from benchmarks.cases.arm import arm_cases, arm_scenario
 from benchmarks.cases.case import Case, Family
+from benchmarks.cases.clearance import clearance_cases, required_clearance, soft_optimum
 from benchmarks.cases.links import link_cases
 from benchmarks.cases.textbook import TEXTBOOK
 
 
 def all_cases() -> tuple[Case, ...]:
     """Return every case of every suite."""
-    return (*TEXTBOOK, *arm_cases(), *link_cases())
+    return (*TEXTBOOK, *arm_cases(), *link_cases(), *clearance_cases())
 
 
-__all__ = ["TEXTBOOK", "Case", "Family", "all_cases", "arm_cases", "arm_scenario", "link_cases"]
+__all__ = [
+    "TEXTBOOK",
+    "Case",
+    "Family",
+    "all_cases",
+    "arm_cases",
+    "arm_scenario",
+    "clearance_cases",
+    "link_cases",
+    "required_clearance",
+    "soft_optimum",
+]

@@ -10,6 +10,7 @@ from benchmarks.figures import (
     constrained,
     descent,
     descent_gap,
+    dilemma,
     dynamic_programming,
     extremals,
     free_and_forced,
@@ -67,6 +68,7 @@ FIGURES = (
     Figure("3.13a", "what makes it climb", descent.causes),
     Figure("3.13b", "its gap over the step length", descent_gap.over_step),
     Figure("3.13c", "its gap over the start", descent_gap.over_start),
+    Figure("3.16", "the cost function dilemma", dilemma.costs),
     Figure("basin", "the basins of single shooting", basin.basins),
 )
 

@@ -1,0 +1,1 @@
+"""Constraints for solvers that do not know them, and held between the nodes."""

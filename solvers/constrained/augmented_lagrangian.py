@@ -1,0 +1,140 @@
+"""The augmented Lagrangian: constraints for solvers that know none, held between the nodes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import (
+    OCP,
+    Data,
+    ProblemError,
+    Program,
+    Solution,
+    Solver,
+    Start,
+    UnsupportedProblem,
+    instance,
+    whole,
+)
+from solvers.constrained.ascent import Ascent
+from solvers.constrained.relaxed import Relaxed
+
+
+@dataclass(frozen=True)
+class AugmentedLagrangian(Solver):
+    r"""Turn constraints into costs, and the costs into constraints again, round by round.
+
+    The relaxed problem (see ``Relaxed``) is built once by the inner solver. After each of its
+    runs the *referee* integrates the controls, and the multipliers at the nodes follow
+
+    .. math::
+
+        \mu_k \leftarrow \max\bigl(0, \mu_k + \rho \, \max_{t \approx t_k} c(t)\bigr)
+
+    with the worst instant of all that are nearer to this node than to another. So at the end
+    the constraint holds between the nodes too. The penalty ρ grows where the violation falls
+    too slowly.
+
+    It relaxes path constraints, state bounds and terminal constraints, of which a relaxed
+    problem has none left; initial constraints, control bounds and a free final time stay with
+    the inner solver, which may refuse them. It succeeds when the referee's violation is within
+    the tolerance, the complementarity is small and the inner solver stands behind its last
+    run; it is ``INFEASIBLE`` when the start itself violates a constraint, or when the largest
+    penalty no longer reduces the violation (a local verdict).
+
+    The multipliers are in ``history``: ``"multiplier"`` (N + 1, m) per second, at the nodes,
+    and ``"terminal multiplier"``; per round ``"violation"``, ``"complementarity"``,
+    ``"penalty"`` and ``"cost"``.
+
+    Source: [Hestenes 1969], [Bertsekas 1982], [Hager 1990]; named in thesis 3.3 and 4.
+
+    Args:
+        inner: the solver of the relaxed problems. Give ``IndirectShooting`` about as many
+            segments as intervals: a large penalty makes the canonical flow stiff.
+        intervals: the multipliers are linear in time on each of these; where the controls are
+            held, take as many.
+        penalty: ρ of the first round.
+        growth: factor by which it is raised.
+        largest_penalty: and up to where.
+        tolerance: on the referee's violation, in the units of the constraints.
+        complementarity: on :math:`\int \mu |c| dt` relative to 1 + abs(cost).
+        max_iterations: limit of rounds.
+    """
+
+    inner: Solver
+    intervals: int = 75
+    penalty: float = 100.0
+    growth: float = 10.0
+    largest_penalty: float = 1e5
+    tolerance: float = 1e-6
+    complementarity: float = 1e-4
+    max_iterations: int = 60
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        instance(self.inner, Solver, "augmented Lagrangian: inner")
+        whole(self.intervals, "augmented Lagrangian: intervals")
+        whole(self.max_iterations, "augmented Lagrangian: max_iterations")
+        if not 0.0 < self.penalty <= self.largest_penalty < np.inf:
+            raise ProblemError(
+                f"augmented Lagrangian: 0 < penalty <= largest_penalty is needed, not "
+                f"{self.penalty}, {self.largest_penalty}"
+            )
+        if not self.growth > 1.0:
+            raise ProblemError(f"augmented Lagrangian: growth = {self.growth}, it must exceed 1")
+        if not (self.tolerance > 0.0 and self.complementarity > 0.0):
+            raise ProblemError("augmented Lagrangian: the tolerances must be positive")
+
+    def build(self, ocp: OCP) -> "AugmentedLagrangianProgram":
+        """Relax the problem and let the inner solver build that.
+
+        Raises:
+            UnsupportedProblem: if there is nothing to relax, in discrete time, or from the inner
+                solver.
+        """
+        if ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "
+                "use a direct method"
+            )
+        relaxed = Relaxed.of(ocp, self.intervals)
+        if not relaxed.path.size + relaxed.end.size:
+            raise UnsupportedProblem(
+                f"{ocp.name}: there is no constraint to relax; use {self.inner!r} itself"
+            )
+        return AugmentedLagrangianProgram(self, ocp, relaxed, self.inner.build(relaxed.ocp))
+
+
+@dataclass(frozen=True, eq=False)
+class AugmentedLagrangianProgram(Program):
+    """A relaxed problem, built by the inner solver.
+
+    Attributes:
+        solver: the options.
+        ocp: the problem.
+        relaxed: the problem without its constraints.
+        inner: the program of the inner solver.
+    """
+
+    solver: AugmentedLagrangian
+    ocp: OCP
+    relaxed: Relaxed
+    inner: Program
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Alternate between the inner solver and the multipliers."""
+        started = perf_counter()
+        data = Data(self.ocp.start(x0), t0, self.ocp.parameter_values(parameters))
+        ascent = Ascent(self, data)
+        status, message = ascent.climb(guess)
+        return ascent.solution(status, message, perf_counter() - started)

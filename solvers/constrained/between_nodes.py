@@ -1,0 +1,177 @@
+"""Path constraints that hold between the nodes too: tightened at the nodes until they do."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+from time import perf_counter
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    ProblemError,
+    Program,
+    Signal,
+    Solution,
+    Solver,
+    Start,
+    Status,
+    UnsupportedProblem,
+    evaluate,
+    instance,
+    whole,
+)
+from solvers.constrained.rows import Rows
+from solvers.direct.multiple_shooting import MultipleShooting
+
+_MARGIN = "margin between the nodes"
+
+
+@dataclass(frozen=True)
+class BetweenNodes(Solver):
+    r"""A direct solver that the referee does not catch out between the nodes.
+
+    A direct method imposes path inequalities and state bounds at its nodes. Here they are
+
+    .. math:: c(x_k, u_k, t_k) + \delta_k \le 0
+
+    with margins δ, a signal, so that the inner program is built once. After each run δ grows
+    near every node by what the referee finds violated there, between the nodes. Two or three
+    runs are enough where the constraint only bulges; where the trajectory jumps *through* an
+    obstacle from one node to the next, take more intervals.
+
+    Equations along the path get no margin: what a held control does to them between the nodes
+    no margin mends.
+
+    Args:
+        inner: the direct solver.
+        tolerance: on the referee's violation, in the units of the constraints.
+        max_rounds: limit of runs of the inner solver.
+    """
+
+    inner: MultipleShooting = field(default_factory=MultipleShooting)
+    tolerance: float = 1e-6
+    max_rounds: int = 15
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        instance(self.inner, MultipleShooting, "between nodes: inner")
+        whole(self.max_rounds, "between nodes: max_rounds")
+        if not self.tolerance > 0.0:
+            raise ProblemError(f"between nodes: tolerance = {self.tolerance}, not positive")
+
+    def build(self, ocp: OCP) -> "BetweenNodesProgram":
+        """Give every path inequality and state bound its margin, and build that.
+
+        Raises:
+            UnsupportedProblem: in discrete time, where nothing lies between the nodes.
+        """
+        if ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "
+                f"use {self.inner!r} itself"
+            )
+        rows = Rows.along(ocp)
+        tightened = _tightened(ocp, rows, self.inner.intervals)
+        return BetweenNodesProgram(self, ocp, rows, self.inner.build(tightened))
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenNodesProgram(Program):
+    """A tightened problem, built by the inner solver.
+
+    Attributes:
+        solver: the options.
+        ocp: the problem.
+        rows: its path constraints and state bounds.
+        inner: the program of the tightened problem.
+    """
+
+    solver: BetweenNodes
+    ocp: OCP
+    rows: Rows
+    inner: Program
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Run, let the referee look, widen the margins, and again."""
+        started, tolerance = perf_counter(), self.solver.tolerance
+        nodes = np.linspace(0.0, 1.0, self.solver.inner.intervals + 1)
+        margin = np.zeros((len(nodes), self.rows.size))
+        runs: list[Solution] = []
+        while True:
+            added = {_MARGIN: margin} if self.rows.size else {}
+            inner = self.inner.run(
+                x0=x0, t0=t0, parameters={**(parameters or {}), **added}, guess=guess
+            )
+            values = {k: v for k, v in inner.parameters.items() if k != _MARGIN}
+            runs.append(inner.with_(problem=self.ocp, parameters=values))
+            verdict = evaluate(runs[-1])
+            done = verdict.violation <= tolerance or len(runs) == self.solver.max_rounds
+            if done or not inner.status.is_success:
+                break
+            found = self.rows.worst_near_nodes(verdict, nodes)
+            excess = np.where(self.rows.is_equation, 0.0, np.maximum(0.0, found))
+            margin = margin + np.where(excess > 0.0, excess + tolerance / 2, 0.0)
+            guess = inner
+        status, message = self._verdict(runs, verdict.violation, verdict.worst, margin)
+        return self._solution(runs, status, message, perf_counter() - started)
+
+    def _verdict(
+        self, runs: list[Solution], violation: float, worst: str, margin: np.ndarray
+    ) -> tuple[Status, str]:
+        last = runs[-1]
+        if last.status.is_success and violation <= self.solver.tolerance:
+            return last.status, last.message
+        if last.status.is_success:
+            return Status.NO_PROGRESS, f"{worst} is violated by {violation:.3g} between the nodes"
+        if not margin.any():
+            return last.status, last.message
+        more = f"with margins up to {margin.max():.3g} for what happens between the nodes"
+        return last.status, f"{last.message} {more}: take more intervals".strip()
+
+    def _solution(
+        self, runs: list[Solution], status: Status, message: str, seconds: float
+    ) -> Solution:
+        """The last run, with the work of all."""
+        work = runs[0].work
+        for run in runs[1:]:
+            work = work + run.work
+        return runs[-1].with_(
+            solver=repr(self.solver),
+            status=status,
+            message=message,
+            iterations=sum(run.iterations for run in runs),
+            work=work,
+            solve_time=seconds,
+        )
+
+
+def _tightened(ocp: OCP, rows: Rows, intervals: int) -> OCP:
+    """Return the problem with margins; the constraints keep their names."""
+    if not rows.size:
+        return ocp
+    margin = ca.SX.sym("margin", rows.size)
+    shifted = ca.if_else(ca.DM(rows.is_equation.astype(float)), rows.c, rows.c + margin)
+    constraints = [c for c in ocp.constraints if c.at != "path"]
+    for name, group in groupby(range(rows.size), key=lambda i: rows.names[i]):
+        members = list(group)
+        lower = np.where(rows.is_equation[members], 0.0, -np.inf)
+        constraints.append(Constraint(name, shifted[members], lower, 0.0))
+    samples = np.zeros((intervals + 1, rows.size))
+    return replace(
+        ocp,
+        state_bounds=Box(),
+        constraints=tuple(constraints),
+        parameters=(*ocp.parameters, Signal(_MARGIN, margin, samples, hold="linear")),
+    )
