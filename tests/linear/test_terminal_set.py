@@ -86,7 +86,7 @@ def test_a_short_horizon_stays_feasible(form):
     """From wherever the first program is solvable all later ones are, and the mass comes home."""
     rng, solved = np.random.default_rng(2), 0
     mpc = MPC(ocp=with_terminal_set(regulator(4)), solver=LinearMPC(form=form), dt=DT)
-    for x0 in rng.uniform([-2, -5], [2, 5], size=(30, 2)):
+    for x0 in rng.uniform([-2, -5], [2, 5], size=(20, 2)):
         run = mpc.run(Plant(ocp=regulator()), x0, 60 * DT)
         if run.ended:
             assert not len(run.inputs), "if it refuses, then at once"
@@ -96,7 +96,7 @@ def test_a_short_horizon_stays_feasible(form):
         assert np.abs(run.inputs).max() <= FORCE
         assert np.abs(run.x[-1]).max() < 0.05 * max(1.0, np.abs(x0).max())
         solved += 1
-    assert solved >= 8
+    assert solved >= 5
 
 
 def test_without_it_a_short_horizon_runs_into_a_dead_end():

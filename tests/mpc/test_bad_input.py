@@ -14,6 +14,7 @@ from ocp import (
     Applied,
     Constraint,
     ControlRefused,
+    Decision,
     FlightRecorder,
     FreeTime,
     Law,
@@ -22,6 +23,7 @@ from ocp import (
     ProblemError,
     Rollout,
     Signal,
+    Solution,
     UnsupportedProblem,
     closed_loop,
     records,
@@ -66,9 +68,14 @@ def test_a_reference_that_ends_leaves_the_last_plan_and_then_the_backup_law(tmp_
     assert "'reference' has 10 samples" in rollout.messages[11]
     assert not rollout.decisions[11].is_informed
     assert not rollout.decisions[11].parameters
-    np.testing.assert_allclose(rollout.inputs[11:20], rollout.decisions[10].plan.u[1:])
+    np.testing.assert_allclose(rollout.inputs[11:20], plan_of(rollout.decisions[10]).u[1:])
     assert len(list(records(tmp_path / "flight"))) == 30
     assert all(replay(mpc, tmp_path / "flight", k).is_exact for k in (5, 11, 19, 25))
+
+
+def plan_of(decision: Decision) -> Solution:
+    assert decision.plan is not None
+    return decision.plan
 
 
 def test_an_earlier_plan_is_judged_by_the_parameters_it_was_made_with() -> None:
@@ -89,11 +96,11 @@ def test_an_earlier_plan_is_judged_by_the_parameters_it_was_made_with() -> None:
     first = mpc.step(START, 0.0)
     assert first.outcome is Outcome.OPTIMAL
     told["on"] = False
-    second = mpc.step(first.plan.x[1], 0.1)
+    second = mpc.step(plan_of(first).x[1], 0.1)
     assert second.outcome is Outcome.SHIFTED
     assert "the radio is off" in second.message
     told["on"] = True
-    assert mpc.step(first.plan.x[2], 0.2).outcome is Outcome.OPTIMAL
+    assert mpc.step(plan_of(first).x[2], 0.2).outcome is Outcome.OPTIMAL
 
 
 @pytest.mark.parametrize(
@@ -176,8 +183,9 @@ def test_a_free_start_or_final_time_is_refused() -> None:
 @pytest.mark.parametrize("name", ["ocp", "solver", "applied"])
 def test_what_is_of_a_wrong_kind_is_named(name) -> None:
     options: dict[str, Any] = {"ocp": cart(), "solver": MultipleShooting(10), "dt": 0.1}
+    options[name] = "control"
     with pytest.raises(ProblemError, match=f"MPC: {name} is a str"):
-        MPC(**(options | {name: "control"}))
+        MPC(**options)
 
 
 def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
@@ -226,8 +234,9 @@ def test_a_rollout_that_was_cut_off_or_changed(tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match="no saved rollout"):
         Rollout.load(tmp_path / "short.npz", mass().ocp)
     with np.load(file) as data:
-        content = dict(data)
-    np.savez(tmp_path / "odd.npz", **(content | {"outcomes": np.full(10, 7)}))
+        content: dict[str, Any] = dict(data)
+    odd: dict[str, Any] = content | {"outcomes": np.full(10, 7)}
+    np.savez(tmp_path / "odd.npz", **odd)
     with pytest.raises(ProblemError, match="none of the four"):
         Rollout.load(tmp_path / "odd.npz", mass().ocp)
     del content["x"]
