@@ -3,26 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError
+from ocp import ProblemError, numbers
 
 
 def vector(values: ArrayLike, size: int, what: str) -> np.ndarray:
-    """Return ``values`` as a read-only finite float vector (size,).
-
-    Raises:
-        ProblemError: on a wrong size, on NaN and on infinity, naming ``what``.
-    """
-    try:
-        result = np.array(values, dtype=float).reshape(-1)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"{what} is not numeric: {values!r}") from error
-    if result.size != size:
-        raise ProblemError(f"{what} has {result.size} entries, {size} are needed")
-    if not np.isfinite(result).all():
-        bad = int(np.flatnonzero(~np.isfinite(result))[0])
-        raise ProblemError(f"{what}[{bad}] is {result[bad]}, a finite number is needed")
-    result.flags.writeable = False
-    return result
+    """Return ``values`` as ``ocp.numbers`` does; one number does not stand for all."""
+    return numbers(values, size, what, repeat=False)
 
 
 def at_least(value: float, lowest: float, what: str, *, strictly: bool = False) -> float:

@@ -3,7 +3,7 @@
 from ocp.constraint import Box, Constraint
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
-from ocp.expressions import instance, whole
+from ocp.expressions import instance, numbers, whole
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
@@ -90,6 +90,7 @@ __all__ = [
     "instance",
     "interpolate",
     "linear_quadratic",
+    "numbers",
     "records",
     "replay",
     "solve",

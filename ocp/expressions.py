@@ -87,14 +87,25 @@ def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
         raise ProblemError(f"{what} is a {type(value).__name__}, {names} is needed")
 
 
-def numbers(values: ArrayLike, size: int, what: str, *, finite: bool = True) -> np.ndarray:
-    """Return ``values`` as a read-only float vector (size,); one number is repeated.
+def numbers(
+    values: ArrayLike, size: int, what: str, *, finite: bool = True, repeat: bool = True
+) -> np.ndarray:
+    """Return ``values`` as a read-only float vector (size,).
+
+    Args:
+        values: numbers.
+        size: how many are needed.
+        what: how a message calls them.
+        finite: whether infinity is refused as well as NaN.
+        repeat: whether one number stands for all.
 
     Raises:
         ProblemError: on a wrong size, on NaN, and on infinity where ``finite``.
     """
     vector = numeric(values, what)
-    vector = np.full(size, float(vector)) if vector.ndim == 0 else vector.reshape(-1)
+    if repeat and vector.ndim == 0:
+        vector = np.full(size, float(vector))
+    vector = vector.reshape(-1)
     if vector.size != size:
         raise ProblemError(f"{what} has {vector.size} entries, {size} are needed")
     wrong = np.flatnonzero(~np.isfinite(vector) if finite else np.isnan(vector))

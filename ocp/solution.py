@@ -1,17 +1,16 @@
 """What a solver returns: a trajectory, its costates, and how it was found."""
 
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
+from ocp.archive import read_archive, write_archive
 from ocp.data import Data
 from ocp.errors import ProblemError, SolverError
 from ocp.optimality import derive
@@ -215,8 +214,6 @@ class Solution:
 
     def save(self, path: str | Path) -> Path:
         """Write everything but the problem to one ``.npz`` file and return its path."""
-        path = Path(path)
-        path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             f"{group}/{key}": value
@@ -225,8 +222,7 @@ class Solution:
         }
         content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
         content |= {"status": self.status.name, "problem": self.problem.name}
-        np.savez_compressed(path, **content)
-        return path
+        return write_archive(path, content)
 
     @classmethod
     def load(cls, path: str | Path, problem: OCP) -> "Solution":
@@ -235,14 +231,8 @@ class Solution:
         Raises:
             ProblemError: if the file belongs to another problem or is no solution.
         """
-        try:
-            with Path(path).open("rb") as raw, np.load(raw) as file:
-                data = {name: file[name] for name in file.files}
-        except (ValueError, TypeError, EOFError, BadZipFile, zlib.error) as error:
-            raise ProblemError(f"{path} is no saved solution: {error}") from error
-        missing = {"status", "problem", *_ARRAYS, *_SCALARS} - set(data)
-        if missing:
-            raise ProblemError(f"{path} is no saved solution: {', '.join(sorted(missing))} missing")
+        needed = {"status", "problem", *_ARRAYS, *_SCALARS}
+        data = read_archive(path, "solution", needed)
         if str(data["problem"]) != problem.name:
             raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
         groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}}

@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Picture
 
-from benchmarks.closed_loop import ClosedLoop
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, held, label, sheet
 from benchmarks.figures.mpc_runs import (
     BOUND,
@@ -17,6 +16,7 @@ from benchmarks.figures.mpc_runs import (
     when,
 )
 from models import sinusoid
+from ocp import Rollout
 
 _CHOSEN = (
     f"Chosen here: w = 3 sin(2 pi t / 4) m and its velocity as reference, start at rest, "
@@ -36,7 +36,7 @@ def positions() -> Drawing:
     axes.annotate("bound", (0.0, BOUND), xytext=(2, 3), textcoords="offset points",
                   color="tab:red", fontsize=8)  # fmt: skip
     far = max(np.abs(loop.x[:, 0]).max() for loop in runs.values())
-    hard = max(np.abs(loop.u).max() for loop in runs.values())
+    hard = max(np.abs(loop.inputs).max() for loop in runs.values())
     sentence = (
         f"Fig. 2.10: the position follows the reference to the bound of {BOUND:g} m and waits "
         f"there; at the steps of all runs |x_1| exceeds it by {max(far - BOUND, 0.0):.0e} m at "
@@ -67,7 +67,7 @@ def approach() -> Drawing:
     near, whole, inputs, bars = picture.subplots(2, 2).flat
     for (name, loop), colour in zip(runs.items(), _PALETTE, strict=True):
         near.plot(loop.t, loop.x[:, 0], ".-", ms=4, color=colour, label=name)
-        held(inputs, loop.t, loop.u[:, 0], color=colour, label=name)
+        held(inputs, loop.t, loop.inputs[:, 0], color=colour, label=name)
     near.axhline(-BOUND, color="tab:red", lw=1.0)
     near.set_ylim(-2.06, -0.6)
     inputs.set_ylim(-5.0, 17.0)
@@ -80,7 +80,7 @@ def approach() -> Drawing:
     _bars(bars, runs, still)
     short, long = peak(runs["N = 5"]), peak(runs["finite horizon"])
     short_0, long_0 = peak(still["N = 5"]), peak(still["finite horizon"])
-    start_0 = np.abs(still["finite horizon"].u).max()
+    start_0 = np.abs(still["finite horizon"].inputs).max()
     sentence = (
         f"Fig. 2.12: with N = 5 the mass brakes late and hard: largest |u| after the first "
         f"{SETTLED:g} s {short:.1f} N, with the finite horizon {long:.1f} N, ratio "
@@ -90,13 +90,13 @@ def approach() -> Drawing:
     columns = _columns(runs)
     for (name, loop), other in zip(runs.items(), still.values(), strict=True):
         columns[f"x_1, {name} [m]"] = loop.x[:, 0]
-        columns[f"u, {name} [N]"] = loop.u[:, 0]
-        columns[f"u, {name}, zero velocity reference [N]"] = other.u[:, 0]
+        columns[f"u, {name} [N]"] = loop.inputs[:, 0]
+        columns[f"u, {name}, zero velocity reference [N]"] = other.inputs[:, 0]
     return Drawing(picture, columns, sentence)
 
 
 def _states(
-    runs: dict[str, ClosedLoop], i: int, axis: str, name: str
+    runs: dict[str, Rollout], i: int, axis: str, name: str
 ) -> tuple[Picture, dict[str, np.ndarray]]:
     picture, columns = sheet(11.0, 4.8), _columns(runs)
     axes, t = picture.subplots(), columns["t [s]"]
@@ -110,25 +110,25 @@ def _states(
     return picture, columns
 
 
-def _columns(runs: dict[str, ClosedLoop]) -> dict[str, np.ndarray]:
+def _columns(runs: dict[str, Rollout]) -> dict[str, np.ndarray]:
     t = runs["N = 5"].t
     w = sinusoid(t)
     return {"t [s]": t, "reference x_1 [m]": w[:, 0], "reference x_2 [m/s]": w[:, 1]}
 
 
-def _whole(axes: Axes, runs: dict[str, ClosedLoop]) -> None:
+def _whole(axes: Axes, runs: dict[str, Rollout]) -> None:
     for name, colour in (("N = 5", COLOURS[0]), ("finite horizon", FINITE)):
         loop = runs[name]
-        held(axes, loop.t, loop.u[:, 0], color=colour, lw=1.2, label=name)
+        held(axes, loop.t, loop.inputs[:, 0], color=colour, lw=1.2, label=name)
         k = int(np.argmin(np.abs(loop.t - when(loop))))
-        axes.plot(loop.t[k], loop.u[k, 0], "o", mfc="none", ms=9, color=colour)
+        axes.plot(loop.t[k], loop.inputs[k, 0], "o", mfc="none", ms=9, color=colour)
     axes.axvspan(0.0, SETTLED, color="gray", alpha=0.15, lw=0)
     axes.set_xlim(0.0, DURATION)
     label(axes, "time [s]", "input u [N]", "shortest and finite horizon (circle: |u| is largest)")
     axes.legend(fontsize=8, loc="upper right")
 
 
-def _bars(axes: Axes, runs: dict[str, ClosedLoop], still: dict[str, ClosedLoop]) -> None:
+def _bars(axes: Axes, runs: dict[str, Rollout], still: dict[str, Rollout]) -> None:
     place = np.arange(len(runs))
     for shift, some, name, colour in (
         (-0.2, runs, "reference with its velocity", COLOURS[1]),
@@ -143,13 +143,13 @@ def _bars(axes: Axes, runs: dict[str, ClosedLoop], still: dict[str, ClosedLoop])
     axes.legend(fontsize=8, loc="upper right", ncols=2)
 
 
-def _speed_at_bound(loop: ClosedLoop) -> float:
+def _speed_at_bound(loop: Rollout) -> float:
     """Largest speed within 1 cm of the bound [m/s]."""
     near = np.abs(loop.x[:, 0]) >= BOUND - 0.01
     return float(np.abs(loop.x[near, 1]).max())
 
 
-def _braking(loop: ClosedLoop) -> tuple[float, float]:
+def _braking(loop: Rollout) -> tuple[float, float]:
     """Largest deceleration on the way to -2 m [m/s^2], and when it begins [s]."""
     rate = np.diff(loop.x[:, 1]) / np.diff(loop.t)
     there = (loop.t[:-1] >= 2.0) & (loop.t[:-1] <= 3.0)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.closed_loop import ClosedLoop
 from benchmarks.figures.drawing import Drawing, sheet
 from benchmarks.figures.mpc_runs import BOUND, SETTLED, peak, receding
 from models import mass_spring_damper, sinusoid
+from ocp import Rollout
 
 _INTERVALS = (0.4, 0.2, 0.1, 0.05, 0.025)
 _LENGTHS = (0.2, 0.4, 0.8, 1.6)
@@ -70,11 +70,11 @@ def _cell(length: float, dt: float) -> _Cell:
     return _Cell(steps, peak(loop), float(outside), float(error))
 
 
-def _between(loop: ClosedLoop, dt: float) -> tuple[np.ndarray, np.ndarray]:
+def _between(loop: Rollout, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """The plant between the samples: exact, the input is held."""
     plant, parts = mass_spring_damper().sampled(_WITHIN), round(dt / _WITHIN)
     x = [loop.x[0]]
-    for u in np.repeat(loop.u, parts, axis=0):
+    for u in np.repeat(loop.inputs, parts, axis=0):
         x.append(plant.A @ x[-1] + plant.B @ u)
     return _WITHIN * np.arange(len(x)), np.array(x)
 

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.closed_loop import ClosedLoop
 from benchmarks.figures.drawing import COLOURS, FINITE, Drawing, held, label, sheet
 from benchmarks.figures.mpc_runs import BOUND, LARGEST, SETTLED, finite, peak, receding
+from ocp import Rollout
 
 _COARSE, _FINE, _DURATION = 0.05, 0.01, 4.0
 _SHORT = 5
@@ -61,22 +61,22 @@ def smaller_steps() -> Drawing:
     return Drawing(picture, columns, sentence)
 
 
-def _approach(above: Axes, below: Axes, loop: ClosedLoop, name: str, colour: str) -> None:
+def _approach(above: Axes, below: Axes, loop: Rollout, name: str, colour: str) -> None:
     above.plot(loop.t, loop.x[:, 0], color=colour, label=name)
     for bound in (-BOUND, BOUND):
         above.axhline(bound, color="tab:red", lw=1.0)
-    held(below, loop.t, loop.u[:, 0], color=colour, label=name)
+    held(below, loop.t, loop.inputs[:, 0], color=colour, label=name)
 
 
-def _columns(name: str, loop: ClosedLoop) -> dict[str, np.ndarray]:
+def _columns(name: str, loop: Rollout) -> dict[str, np.ndarray]:
     return {
         f"t, {name} [s]": loop.t,
         f"x_1, {name} [m]": loop.x[:, 0],
-        f"u, {name} [N]": loop.u[:, 0],
+        f"u, {name} [N]": loop.inputs[:, 0],
     }
 
 
-def _jump(loop: ClosedLoop) -> float:
+def _jump(loop: Rollout) -> float:
     """Largest change of u from one interval to the next, after the first half second."""
-    late = loop.u[loop.t[:-1] >= SETTLED - 1e-9, 0]
+    late = loop.inputs[loop.t[:-1] >= SETTLED - 1e-9, 0]
     return float(np.abs(np.diff(late)).max())

@@ -1,12 +1,12 @@
 """The constrained tracking problem 2.92 to 2.94 in closed loop, for figures 2.10 to 2.14."""
 
 from functools import cache
+from typing import Literal
 
 import numpy as np
 
-from benchmarks.closed_loop import ClosedLoop, feed_forward, receding_horizon
-from models import mass_spring_damper, sinusoid, thesis_tracking
-from ocp import solve
+from models import sinusoid, thesis_tracking
+from ocp import MPC, Law, Outcome, Plant, Rollout, SolverError, closed_loop, solve
 from solvers import LinearMPC
 
 HORIZONS = (5, 10, 20, 40)
@@ -19,49 +19,65 @@ ROUNDING = 1e-9
 
 @cache
 def receding(
-    steps: int, *, dt: float = 0.05, moving: bool = True, duration: float = DURATION
-) -> ClosedLoop:
-    """Return a run with a receding horizon.
+    steps: int,
+    *,
+    dt: float = 0.05,
+    moving: bool = True,
+    duration: float = DURATION,
+    form: Literal["sparse", "condensed"] = "condensed",
+) -> Rollout:
+    """Return a run with a receding horizon, every decision of it optimal.
 
     Args:
         steps: horizon N.
         dt: interval of prediction and simulation [s].
         moving: whether the reference has a velocity.
         duration: of the run [s].
+        form: of the quadratic program.
     """
-    plant, count = mass_spring_damper().sampled(dt), round(duration / dt)
-    reference = sinusoid(dt * np.arange(count + steps + 1), moving=moving)
-    return receding_horizon(
-        LinearMPC(form="condensed").build(thesis_tracking(steps, dt=dt, moving=moving)),
-        lambda x, u: plant.A @ x + plant.B @ u,
-        np.zeros(2),
-        count,
-        preview=lambda k: {"reference": reference[k : k + steps + 1]},
+    ahead = dt * np.arange(steps + 1)
+    mpc = MPC(
+        ocp=thesis_tracking(steps, dt=dt, moving=moving),
+        solver=LinearMPC(form=form),
         dt=dt,
+        parameters=lambda t: {"reference": sinusoid(t + ahead, moving=moving)},
     )
+    run = mpc.run(_plant(dt, moving), np.zeros(2), duration).or_raise()
+    # A figure of the optimal control law has no place for another rung of the ladder.
+    worse = next((d for d in run.decisions if d.outcome is not Outcome.OPTIMAL), None)
+    if worse is not None:
+        raise SolverError(f"N = {steps}, t = {worse.t:g} s: {worse.outcome.name}, {worse.message}")
+    return run
 
 
 @cache
-def finite(*, dt: float = 0.05, moving: bool = True, duration: float = DURATION) -> ClosedLoop:
+def finite(*, dt: float = 0.05, moving: bool = True, duration: float = DURATION) -> Rollout:
     """Return the whole duration as one problem, its inputs fed forward: horizon 0 of the thesis."""
-    plant = mass_spring_damper().sampled(dt)
-    ocp = thesis_tracking(round(duration / dt), dt=dt, moving=moving)
-    plan = solve(ocp, LinearMPC()).or_raise()
-    return feed_forward(plan, lambda x, u: plant.A @ x + plant.B @ u)
+    plan = solve(thesis_tracking(round(duration / dt), dt=dt, moving=moving), LinearMPC())
+    law = Law.following(plan.or_raise())
+    return closed_loop(law, _plant(dt, moving), plan.x0, duration, dt=dt).or_raise()
 
 
-def all_runs(*, moving: bool = True) -> dict[str, ClosedLoop]:
+def all_runs(*, moving: bool = True) -> dict[str, Rollout]:
     """Return the runs of figures 2.10 to 2.12 by their names."""
     runs = {f"N = {n}": receding(n, moving=moving) for n in HORIZONS}
     return runs | {"finite horizon": finite(moving=moving)}
 
 
-def peak(loop: ClosedLoop) -> float:
+def peak(run: Rollout) -> float:
     """Return the largest abs(u) after the first half second."""
-    return float(np.abs(loop.u[loop.t[:-1] >= SETTLED - ROUNDING]).max())
+    return float(np.abs(run.inputs[run.t[:-1] >= SETTLED - ROUNDING]).max())
 
 
-def when(loop: ClosedLoop) -> float:
+def when(run: Rollout) -> float:
     """Return when it is that large for the first time [s]."""
-    late = np.where(loop.t[:-1] >= SETTLED - ROUNDING, np.abs(loop.u[:, 0]), 0.0)
-    return float(loop.t[np.flatnonzero(late >= (1.0 - 1e-6) * late.max())[0]])
+    late = np.where(run.t[:-1] >= SETTLED - ROUNDING, np.abs(run.inputs[:, 0]), 0.0)
+    return float(run.t[np.flatnonzero(late >= (1.0 - 1e-6) * late.max())[0]])
+
+
+def _plant(dt: float, moving: bool) -> Plant:
+    """Return the plant that is the model, its cost with the reference of the moment."""
+    return Plant(
+        ocp=thesis_tracking(1, dt=dt, moving=moving),
+        parameters=lambda t: {"reference": sinusoid([t], moving=moving)[0]},
+    )

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.closed_loop import ClosedLoop, feed_forward
 from benchmarks.figures.drawing import COLOURS, FINITE, Drawing, held, label, sheet
 from models import LinearPlant, stable_plant, thesis_regulator, unstable_plant
-from ocp import solve
+from ocp import Law, Plant, Rollout, closed_loop, solve
 from solvers import Batch, Riccati
 
 _STEPS = 50
@@ -19,8 +18,8 @@ _DRAWN = 2.5  # [s]; at rest afterwards
 
 class _Pair(NamedTuple):
     name: str
-    batch: ClosedLoop
-    recursive: ClosedLoop
+    batch: Rollout
+    recursive: Rollout
     cost: float
     worst: float
 
@@ -49,14 +48,14 @@ def inputs() -> Drawing:
         label(axes, "time [s]", "input u", pair.name)
         axes.set_xlim(0.0, _DRAWN)
         axes.legend(fontsize=8)
-        columns |= _columns(pair, "u", lambda loop: loop.u)
+        columns |= _columns(pair, "u", lambda loop: loop.inputs)
     return Drawing(picture, columns, _sentence("2.4", "inputs"))
 
 
 def _both_inputs(axes: Axes, pair: _Pair) -> None:
     t = pair.batch.t
-    held(axes, t, pair.batch.u[:, 0], color=COLOURS[1], lw=3.5, alpha=0.5, label="batch, 2.13")
-    held(axes, t, pair.recursive.u[:, 0], color=FINITE, ls="--", label="recursive, 2.47")
+    held(axes, t, pair.batch.inputs[:, 0], color=COLOURS[1], lw=3.5, alpha=0.5, label="batch, 2.13")
+    held(axes, t, pair.recursive.inputs[:, 0], color=FINITE, ls="--", label="recursive, 2.47")
 
 
 @cache
@@ -65,23 +64,21 @@ def _pairs() -> tuple[_Pair, _Pair]:
 
 
 def _pair(plant: LinearPlant) -> _Pair:
-    def step(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return plant.A @ x + plant.B @ u
-
-    ocp = thesis_regulator(plant, _STEPS)
-    planned = solve(ocp, Batch())
-    batch = feed_forward(planned, step)
-    x, u = [np.ones(len(plant.A))], []
-    for gain in Riccati().build(ocp).K:
-        u.append(-gain @ x[-1])
-        x.append(step(x[-1], u[-1]))
-    recursive = ClosedLoop(batch.t, np.array(x), np.array(u), ())
-    worst = max(np.abs(batch.x - recursive.x).max(), np.abs(batch.u - recursive.u).max())
-    return _Pair(plant.name, batch, recursive, planned.cost, float(worst))
+    ocp, dt = thesis_regulator(plant, _STEPS), plant.model.dt or 0.0
+    planned, gains = solve(ocp, Batch()), Riccati().build(ocp).K
+    laws = (
+        Law.following(planned),
+        Law(law=lambda x, t: -gains[round(t / dt)] @ x),
+    )
+    batch, recursive = (
+        closed_loop(law, Plant(ocp=ocp), planned.x0, _STEPS * dt, dt=dt).or_raise() for law in laws
+    )
+    apart = (np.abs(batch.x - recursive.x).max(), np.abs(batch.inputs - recursive.inputs).max())
+    return _Pair(plant.name, batch, recursive, planned.cost, float(max(apart)))
 
 
 def _columns(
-    pair: _Pair, letter: str, of: Callable[[ClosedLoop], np.ndarray]
+    pair: _Pair, letter: str, of: Callable[[Rollout], np.ndarray]
 ) -> dict[str, np.ndarray]:
     columns = {"t [s]": pair.batch.t}
     for kind, loop in (("batch", pair.batch), ("recursive", pair.recursive)):

@@ -41,7 +41,9 @@ class Decision:
         residual: the solver's optimality residual; inf without a plan of this step.
         age: steps since that plan was made, 0 for a new one.
         late: whether a new plan came too late for this step.
-        parameters: of the horizon, by name.
+        parameters: values of parameters and samples of signals of the horizon from
+            ``applies_at`` on, by name, as the solver gets them.
+        is_informed: False where the controller's ``parameters`` failed; there are none then.
         clipped: by how much the input was moved to lie within its bounds.
         time_used: of this step [s].
     """
@@ -57,6 +59,7 @@ class Decision:
     age: int = 0
     late: bool = False
     parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    is_informed: bool = True
     clipped: float = 0.0
     time_used: float = 0.0
 

@@ -7,15 +7,18 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.errors import ProblemError
+from ocp.errors import ProblemError, UnsupportedProblem
+from ocp.expressions import instance
 from ocp.mpc.applied import Applied
+from ocp.mpc.asking import INSIDE, Rule
 from ocp.mpc.decision import ControlRefused, Decision
 from ocp.mpc.delay import late_steps
-from ocp.mpc.ladder import Backup, Ladder, Moment
+from ocp.mpc.ladder import Ladder, Moment
 from ocp.mpc.loop import Watch, closed_loop
 from ocp.mpc.memory import Memory
 from ocp.mpc.plant import Plant
 from ocp.mpc.rollout import Rollout
+from ocp.parameters import ParameterValues
 from ocp.problem import OCP
 from ocp.solver import Solver, Start
 
@@ -50,7 +53,9 @@ class MPC:
             for dt: plans whose controls are held for less are applied only in their first part.
         applied: what the plant receives.
         backup: (x, t) -> input (m,); default: hold the last input.
-        parameters: t -> parameters and signals of the horizon that starts there.
+        parameters: t -> parameters and signals of the horizon that starts there. If it raises,
+            or what it returns does not fit, at the first step that is an error; later there
+            is no new plan, and the last one is judged by the parameters it was made with.
         guess: where the first step starts; a ``Solution`` of any solver. Indirect shooting
             needs a good one: from its own it may converge to a spurious extremal and stay there.
         delay: time from measurement to effect [s], a multiple of dt.
@@ -62,14 +67,15 @@ class MPC:
 
     Raises:
         ProblemError: if interval, delay, budget or bounds do not fit the problem.
-        UnsupportedProblem: if the solver cannot treat it.
+        UnsupportedProblem: if the solver cannot treat it, its start is free (here it is
+            measured), or its final time is.
     """
 
     ocp: OCP
     solver: Solver
     dt: float
     applied: Applied = field(default_factory=Applied)
-    backup: Backup | None = None
+    backup: Rule | None = None
     parameters: Parameters | None = None
     guess: Start | None = None
     delay: float = 0.0
@@ -93,7 +99,14 @@ class MPC:
         )
 
     def _check(self) -> None:
+        instance(self.ocp, OCP, "MPC: ocp")
+        instance(self.solver, Solver, "MPC: solver")
+        instance(self.applied, Applied, "MPC: applied")
         name, model, dt = self.ocp.name, self.ocp.model, self.dt
+        if self.ocp.has_free_time:
+            raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
+        if self.ocp.has_free_start:
+            raise UnsupportedProblem(f"MPC of {name}: its start is free, here it is measured")
         if not 0.0 < dt < np.inf:
             raise ProblemError(f"MPC of {name}: dt = {dt} s, it must be positive, finite")
         if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
@@ -111,10 +124,6 @@ class MPC:
     def remembers(self) -> bool:
         """Whether the solver's own answers depend on the runs before."""
         return self._ladder.program.remembers
-
-    def twin(self) -> "MPC":
-        """Return a controller like this one that knows nothing yet."""
-        return replace(self)
 
     def reset(self) -> None:
         """Forget the last plan and input."""
@@ -134,17 +143,15 @@ class MPC:
             x: measured state (nx,); NaN is a missing measurement.
             t: when it was measured [s].
             late: whether the answer counts as late; default: by the clock.
-            parameters: of the horizon that starts when the input acts; default: what the
-                controller's own ``parameters`` say.
+            parameters: of the horizon that starts when the input acts, by name; default: what
+                the controller's own ``parameters`` say.
 
         Raises:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
         started = perf_counter()
-        if parameters is None and self.parameters is not None:
-            parameters = self.parameters(t + self.delay)
-        moment = self._moment(x, float(t), parameters)
+        moment = self._moment(x, t, parameters)
         ladder = self._ladder
         plan, status = ladder.solve(moment)
         used = perf_counter() - started
@@ -177,25 +184,63 @@ class MPC:
         seed: int = 0,
         watch: Watch | None = None,
     ) -> Rollout:
-        """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval."""
+        """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval.
+
+        Raises:
+            ProblemError: if states or inputs of plant and problem differ in number.
+        """
+        for what, ours, theirs in (
+            ("states", self.ocp.model.nx, plant.ocp.model.nx),
+            ("inputs", self.applied.size(self.ocp), plant.ocp.model.nu),
+        ):
+            if ours != theirs:
+                raise ProblemError(
+                    f"MPC of {self.ocp.name}: {ours} {what}, but the plant '{plant.ocp.name}' "
+                    f"has {theirs}"
+                )
         return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
 
     def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
         """Collect what a decision is made from."""
-        nx, plan = self.ocp.model.nx, self.memory.plan
-        state = np.array(x, dtype=float)
-        if state.shape != (nx,) or not np.isfinite(t):
+        state, plan, at = np.array(x, dtype=float), self.memory.plan, t + self.delay
+        if state.shape != (self.ocp.model.nx,) or not np.isfinite(t):
             raise ProblemError(
                 f"MPC of {self.ocp.name}: x has shape {state.shape} at t = {t}; "
-                f"({nx},) and a finite time are needed"
+                f"({self.ocp.model.nx},) and a finite time are needed"
             )
-        values = self.ocp.parameter_values(parameters)
-        is_measured, at = bool(np.isfinite(state).all()), t + self.delay
-        if not is_measured:
-            state = self.ocp.start() if plan is None else plan.state(at)
+        values, why = self._informed(at, parameters)
+        since = plan.t[0] if why and plan else at
+        is_measured = bool(np.isfinite(state).all())
+        if not is_measured:  # without a plan the backup law sees what was measured
+            state = state if plan is None else plan.state(at)
         elif self.compensate:
-            state = self._predicted(state, t, values.at(0.0)[0])
-        return Moment(t=t, at=at, start=state, is_measured=is_measured, plan=plan, values=values)
+            state = self._predicted(state, t, values.at((at - since) / self.ocp.duration)[0])
+        return Moment(
+            t=float(t),
+            at=at,
+            start=state,
+            is_measured=is_measured,
+            plan=plan,
+            values=values,
+            since=since,
+            is_informed=not why,
+            reasons=why,
+        )
+
+    def _informed(
+        self, at: float, given: Mapping[str, ArrayLike] | None
+    ) -> tuple[ParameterValues, list[str]]:
+        """Return the parameters of a horizon, or those of the last plan and why."""
+        if given is not None or self.parameters is None:
+            return self.ocp.parameter_values(given), []
+        try:
+            return self.ocp.parameter_values(self.parameters(at)), []
+        except INSIDE as error:
+            if self.memory.input is None:  # nothing has moved yet: let it be mended
+                raise
+            known = self.memory.plan.parameters if self.memory.plan else None
+            why = f"no parameters from t = {at:g} s on: {error}"
+            return self.ocp.parameter_values(known), [why]
 
     def _predicted(self, x: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the state after the delay, under the inputs that are on their way."""

@@ -1,16 +1,14 @@
 """From a measurement to an input that somebody answers for: the rungs, best first."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
-from ocp.errors import OCPError
 from ocp.mpc.applied import Applied
-from ocp.mpc.decision import Decision, Outcome
+from ocp.mpc.asking import INSIDE, Rule, asked
+from ocp.mpc.decision import ControlRefused, Decision, Outcome
 from ocp.mpc.rehearsal import Ends, Rehearsal
 from ocp.mpc.shift import controls, shifted
 from ocp.parameters import ParameterValues
@@ -19,10 +17,6 @@ from ocp.solution import Solution
 from ocp.solver import Program, Start
 from ocp.status import Status
 
-Backup = Callable[[np.ndarray, float], ArrayLike]
-
-# Whatever a solver may raise for numbers that it did not expect; a TypeError is a bug, and stays.
-_INSIDE = (OCPError, ArithmeticError, ValueError, RuntimeError, LookupError, MemoryError)
 # Not converged, but with a trajectory that may be worth applying.
 _USABLE = frozenset(
     {
@@ -45,9 +39,13 @@ class Moment:
         t: when the state was measured [s].
         at: when the input acts [s].
         start: the state then (nx,), predicted where need be.
-        is_measured: False where the measurement is missing and the last plan stands in.
+        is_measured: False where the measurement is missing; the last plan's state stands in, if
+            there is one.
         plan: the last good one.
-        values: parameters and signals of the horizon from ``at`` on.
+        values: parameters and signals of a horizon.
+        since: where that horizon begins [s]: at ``at``, or where the last plan began.
+        is_informed: False where nobody could say the parameters of the horizon from ``at`` on,
+            and those of the last plan stand in as far as they reach.
         reasons: why the rungs above do not hold, in words; grows on the way down.
     """
 
@@ -57,6 +55,8 @@ class Moment:
     is_measured: bool
     plan: Solution | None
     values: ParameterValues
+    since: float
+    is_informed: bool
     reasons: list[str] = field(default_factory=list)
 
 
@@ -78,7 +78,7 @@ class Ladder:
     program: Program
     applied: Applied
     guess: Start | None
-    backup: Backup | None
+    backup: Rule | None
     dt: float
     tolerance: float
     _rehearsals: dict[int, Rehearsal] = field(default_factory=dict)
@@ -87,6 +87,7 @@ class Ladder:
         """Return a new plan that meets the constraints, and how the solver ended."""
         if not moment.is_measured:
             moment.reasons.append("the measurement is not finite")
+        if not (moment.is_measured and moment.is_informed):
             return None, None
         last = moment.plan
         try:
@@ -96,7 +97,7 @@ class Ladder:
                 parameters=moment.values.as_dict(),
                 guess=shifted(last, moment.at) if last else self.guess,
             )
-        except _INSIDE as error:
+        except INSIDE as error:
             moment.reasons.append(f"{type(error).__name__} inside the solver: {error}")
             return None, None
         excess, worst = self._excess(plan, moment)
@@ -125,18 +126,18 @@ class Ladder:
 
     def backed_up(self, moment: Moment, last: np.ndarray | None) -> Decision | None:
         """Ask the backup law; without one hold the last input."""
-        given = last
+        given, needed = last, self.applied.size(self.ocp)
         if self.backup is not None:
             try:
-                given = np.array(self.backup(moment.start, moment.at), dtype=float).reshape(-1)
-            except _INSIDE as error:
-                moment.reasons.append(f"{type(error).__name__} inside the backup law: {error}")
+                given = asked(self.backup, "the backup law", moment.start, moment.at)
+            except ControlRefused as refusal:
+                moment.reasons.append(str(refusal))
                 return None
         if given is None:
             moment.reasons.append("there is no input to hold, and no backup law")
             return None
-        if given.shape != np.shape(self.box.lower) or not np.isfinite(given).all():
-            moment.reasons.append(f"the backup law returned {given}")
+        if len(given) != needed:
+            moment.reasons.append(f"the backup law returned {len(given)} numbers, not {needed}")
             return None
         return self._decision(moment, given, Outcome.BACKUP, np.inf)
 
@@ -175,7 +176,7 @@ class Ladder:
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
         u = controls(plan, np.array([moment.at + middle]))[0]
-        given = self.applied.of(self.ocp, moment.start, u, moment.at, moment.values.at(0.0)[0])
+        given = self.applied.of(self.ocp, moment.start, u, moment.at, self._now(moment))
         decision = self._decision(moment, given, outcome, self.tolerance)
         if decision is None:
             return None
@@ -194,13 +195,18 @@ class Ladder:
             applies_at=moment.at,
             input=self.box.clip(given),
             outcome=outcome,
-            parameters=moment.values.as_dict(),
+            parameters=moment.values.as_dict() if moment.is_informed else {},
+            is_informed=moment.is_informed,
             clipped=excess,
         )
 
     def _ends(self, moment: Moment, times: np.ndarray) -> Ends:
         """Return the parameters at both ends of the intervals between some instants (N + 1,)."""
-        return moment.values.on((times - moment.at) / self.ocp.duration)
+        return moment.values.on((times - moment.since) / self.ocp.duration)
+
+    def _now(self, moment: Moment) -> np.ndarray:
+        """Return the parameters when the input acts (n_p,)."""
+        return moment.values.at((moment.at - moment.since) / self.ocp.duration)[0]
 
     def _rehearsal(self, n: int) -> Rehearsal:
         """Roll-outs over n intervals, prepared once for each n."""

@@ -1,14 +1,15 @@
 """A plain control law as a controller, so that it compares with a receding horizon."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
+from ocp.mpc.asking import Rule, asked
 from ocp.mpc.decision import ControlRefused, Decision, Outcome
+from ocp.mpc.shift import controls
+from ocp.solution import Solution
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -23,9 +24,14 @@ class Law:
         delay: time from measurement to effect [s].
     """
 
-    law: Callable[[np.ndarray, float], ArrayLike]
+    law: Rule
     bounds: Box = field(default_factory=Box)
     delay: float = 0.0
+
+    @classmethod
+    def following(cls, plan: Solution) -> "Law":
+        """Return the law that feeds a plan forward, whatever the state; its last input is held."""
+        return cls(law=lambda x, t: controls(plan, np.array([t]))[0])
 
     def reset(self) -> None:
         """Do nothing: a law has no memory."""
@@ -34,12 +40,13 @@ class Law:
         """Evaluate the law.
 
         Raises:
-            ControlRefused: if it returns no finite numbers.
+            ControlRefused: if it raises, or returns no finite numbers.
         """
         started = perf_counter()
-        given = np.array(self.law(x, t), dtype=float).reshape(-1)
-        if not np.isfinite(given).all():
-            raise ControlRefused(f"t = {t:g} s: the law returned {given} for x = {x}")
+        try:
+            given = asked(self.law, "the law", x, t)
+        except ControlRefused as refusal:
+            raise ControlRefused(f"t = {t:g} s: {refusal}") from refusal
         return Decision(
             t=t,
             applies_at=t + self.delay,

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Constraint
 from ocp.errors import ProblemError
+from ocp.expressions import numbers
 from ocp.mpc.decision import Controller, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.plant import Plant, RunningPlant
@@ -47,16 +48,20 @@ def closed_loop(
         watch: called with every measurement and decision, such as a ``FlightRecorder``.
 
     Raises:
-        ProblemError: if the plant takes another input than the controller sends, or the
-            duration is no multiple of dt.
+        ProblemError: if the plant takes another input than the controller sends, the duration is
+            no multiple of dt, or a function of the plant returns what does not fit.
     """
+    if not (0.0 < dt < np.inf and np.isfinite(duration)):
+        raise ProblemError(f"closed loop: {duration} s in steps of dt = {dt} s is no run")
     steps = round(duration / dt)
     if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
         raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
     controller.reset()
     journal = _Journal(plant.ocp, plant.started(x0, seed))
     box, m = plant.ocp.control_bounds, plant.ocp.model.nu
-    first = box.clip(np.zeros(m)) if initial_input is None else np.array(initial_input, float)
+    first = box.clip(np.zeros(m))
+    if initial_input is not None:
+        first = numbers(initial_input, m, "closed loop: initial_input")
     ahead = [first] * late_steps(controller.delay, dt)
     for _ in range(steps):
         measured = journal.running.measure()

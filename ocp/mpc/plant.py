@@ -107,8 +107,10 @@ class RunningPlant:
         """Return all parameters and signals at an instant, stacked (n_p,)."""
         if self.plant.parameters is None:
             return self._declared
-        now = self.plant.parameters(t)
-        entries = self.plant.ocp.parameters
+        now, entries = self.plant.parameters(t), self.plant.ocp.parameters
+        missing = [e.name for e in entries if e.name not in now]
+        if missing:
+            raise ProblemError(f"plant: no value of {', '.join(missing)} at t = {t:g} s")
         return np.concatenate(
             [numbers(now[e.name], e.symbol.numel(), f"plant: '{e.name}'") for e in entries]
         )
@@ -116,11 +118,9 @@ class RunningPlant:
     def _acted(self, given: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return what the actuators do in each substep (substeps, m)."""
         plant = self.plant
-        wanted = np.tile(given, (len(times) - 1, 1))
+        m, wanted = len(given), np.tile(given, (len(times) - 1, 1))
         if plant.disturbance is not None:
-            wanted = wanted + np.array([plant.disturbance(t) for t in times[:-1]]).reshape(
-                wanted.shape
-            )
+            wanted += [numbers(plant.disturbance(t), m, "plant: disturbance") for t in times[:-1]]
         wanted = plant.saturation.clip(wanted)
         if plant.lag == 0.0:
             return wanted

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, NamedTuple, Self
@@ -11,7 +11,8 @@ import numpy as np
 
 from ocp.errors import ProblemError
 from ocp.mpc.decision import ControlRefused, Decision, Outcome
-from ocp.mpc.driver import MPC, Memory
+from ocp.mpc.driver import MPC
+from ocp.mpc.memory import Memory
 from ocp.solution import Solution
 from ocp.status import Status
 
@@ -63,6 +64,7 @@ class FlightRecorder:
             "outcome": decision.outcome.name,
             "status": decision.status.name if decision.status else None,
             "late": decision.late,
+            "informed": decision.is_informed,
             "message": decision.message,
             "age": decision.age,
             "clipped": decision.clipped,
@@ -158,11 +160,12 @@ def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
     for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
         if header[name] != own:
             raise ProblemError(f"{path} records the {name} '{header[name]}', not '{own}'")
-    again = mpc.twin()
+    known = _Known()
+    again = replace(mpc, parameters=known)
     memory, found = Memory(), None
     for k, record in enumerate(records(path)):
         if k == step or again.remembers:
-            again.memory = memory
+            again.memory, known.record = memory, record
             found = Replay(record, _again(again, record))
         if k == step:
             assert found is not None
@@ -181,13 +184,24 @@ def _header(file: BinaryIO, path: str | Path) -> dict[str, str]:
     return header
 
 
+@dataclass(eq=False)
+class _Known:
+    """The parameters as they were known at a recorded step, instead of the controller's own."""
+
+    record: Record | None = None
+
+    def __call__(self, t: float) -> dict[str, np.ndarray]:
+        if self.record is None or not self.record.entry["informed"]:
+            raise ProblemError("nobody knew them")
+        return _parameters(self.record)
+
+
 def _again(mpc: MPC, record: Record) -> Decision | None:
     try:
         return mpc.step(
             record.arrays["measured"],
             record.entry["t"],
             late=record.entry["late"],
-            parameters=_parameters(record),
         )
     except ControlRefused:
         return None

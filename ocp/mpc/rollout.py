@@ -3,11 +3,11 @@
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-from zipfile import BadZipFile
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ocp.archive import read_archive, write_archive
 from ocp.errors import ProblemError, SolverError
 from ocp.mpc.decision import Decision, Outcome
 from ocp.problem import OCP
@@ -82,16 +82,13 @@ class Rollout:
 
     def save(self, path: str | Path) -> Path:
         """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
-        path = Path(path)
-        path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
-        np.savez_compressed(
-            path,
-            **{name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)},
-            outcomes=np.array([_OUTCOMES.index(o) for o in self.outcomes], dtype=int),
-            messages=np.array(self.messages, dtype=str),
-            name=self.plant.name,
-        )
-        return path
+        content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
+        content |= {
+            "outcomes": np.array([_OUTCOMES.index(o) for o in self.outcomes], dtype=int),
+            "messages": np.array(self.messages, dtype=str),
+            "plant": self.plant.name,
+        }
+        return write_archive(path, content)
 
     @classmethod
     def load(cls, path: str | Path, plant: OCP) -> "Rollout":
@@ -100,22 +97,19 @@ class Rollout:
         Raises:
             ProblemError: if the file belongs to another plant or is no rollout.
         """
-        try:
-            with Path(path).open("rb") as raw, np.load(raw) as file:
-                data = {name: file[name] for name in file.files}
-            if str(data["name"]) != plant.name:
-                raise ProblemError(f"{path} is a loop with '{data['name']}', not '{plant.name}'")
-            return cls(
-                plant=plant,
-                **{name: data[name] for name in _ARRAYS},
-                **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
-                outcomes=tuple(_OUTCOMES[i] for i in data["outcomes"]),
-                messages=tuple(map(str, data["messages"])),
-            )
-        except ProblemError:
-            raise
-        except (KeyError, ValueError, TypeError, IndexError, EOFError, BadZipFile) as error:
-            raise ProblemError(f"{path} is no saved rollout: {error}") from error
+        needed = {"outcomes", "messages", "plant", *_ARRAYS, *_SCALARS}
+        data = read_archive(path, "rollout", needed)
+        if str(data["plant"]) != plant.name:
+            raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
+        if not np.isin(data["outcomes"], range(len(_OUTCOMES))).all():
+            raise ProblemError(f"{path} is no saved rollout: an outcome is none of the four")
+        return cls(
+            plant=plant,
+            **{name: data[name] for name in _ARRAYS},
+            **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            outcomes=tuple(_OUTCOMES[i] for i in data["outcomes"]),
+            messages=tuple(map(str, data["messages"])),
+        )
 
 
 _ARRAYS = ("t", "x", "measured", "inputs", "costs", "step_times", "clipped")

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,10 +18,10 @@ from ocp import (
     Solver,
     Start,
     Status,
-    Work,
     linear_quadratic,
 )
 from solvers.linear import recursion
+from solvers.linear.run import Run
 from solvers.linear.stacked import Prediction
 
 # Above this condition number of H the inputs have fewer than about eight correct digits.
@@ -96,36 +95,27 @@ class BatchProgram(Program):
         guess: Start | None = None,
     ) -> Solution:
         """Solve for these data; a guess is not needed."""
-        started = perf_counter()
-        data = self.lq.data(x0, t0, parameters)
-        numbers = self.lq.on(data)
+        run = Run.of(self.lq, x0, t0, parameters)
+        numbers = run.numbers
         stacked = self.fixed or self._stack(numbers.matrices)
-        x, u, status, message = self._solve(stacked, numbers, data.x0)
-        finite = status is not Status.DIVERGED
-        n, m = len(data.x0), numbers.matrices
+        x, u, status, message = self._solve(stacked, numbers, run.data.x0)
+        n, m = x.shape[1], numbers.matrices
         half = recursion.half_slopes(numbers, x, u)
         by_x, by_u = 2.0 * half[:, :n], 2.0 * half[:, n:]
         final = 2.0 * (m.P @ x[-1] + numbers.p)
         costate = stacked.prediction.costates(by_x, by_u, final)
         h_u = by_u + (costate[1:, None] @ m.B)[:, 0]
-        finite = finite and bool(np.isfinite(costate).all())
-        ocp = self.lq.ocp
-        return Solution(
-            problem=ocp,
-            solver=repr(self.solver),
+        finite = status is not Status.DIVERGED and bool(np.isfinite(costate).all())
+        return run.solution(
+            repr(self.solver),
             status=status,
             message=message,
-            t=t0 + self.lq.nodes,
             x=x,
-            x0=data.x0,
-            costate=costate if finite else np.zeros_like(x),
             u=u,
+            costate=costate if finite else np.zeros_like(x),
             cost=recursion.cost(numbers, x, u, half) if finite else np.inf,
             residual=float(np.abs(h_u).max()) if finite else np.inf,
-            iterations=1,
-            work=Work(rollouts=1, factorisations=1),
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
+            factorisations=1,
         )
 
     def _stack(self, matrices: Matrices) -> _Stacked:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from time import perf_counter
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -21,7 +20,6 @@ from ocp import (
     Solver,
     Start,
     Status,
-    Work,
     instance,
     linear_quadratic,
 )
@@ -30,6 +28,7 @@ from solvers.linear.elastic import least_violation
 from solvers.linear.linear_forms import Condensed, Form, Sparse
 from solvers.linear.qp_backends import Answer, Backend, qp_backend
 from solvers.linear.quadratic_program import QP, Softening
+from solvers.linear.run import Run
 
 # A constraint that no point can meet better than this is infeasible, not inaccurate.
 _UNAVOIDABLE = 1e-7
@@ -140,7 +139,7 @@ class LinearMPCProgram(Program):
 
     def quadratic_program(self, data: Data) -> QP:
         """Return the (soft) program of a run, for who wants to solve it elsewhere."""
-        return self._programs(data, self.lq.on(data))[1]
+        return self._programs(data.x0, self.lq.on(data))[1]
 
     def run(
         self,
@@ -151,42 +150,36 @@ class LinearMPCProgram(Program):
         guess: Start | None = None,
     ) -> Solution:
         """Solve for these data, from the last answer unless there is a guess."""
-        started = perf_counter()
-        data = self.lq.data(x0, t0, parameters)
-        numbers = self.lq.on(data)
-        hard, qp = self._programs(data, numbers)
+        run = Run.of(self.lq, x0, t0, parameters)
+        numbers, start = run.numbers, run.data.x0
+        hard, qp = self._programs(start, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
         found = answer.residuals
         z, y, status, message = self._verdict(answer, hard, qp)
-        x, u = self.form.trajectory(z, numbers, data.x0)
+        x, u = self.form.trajectory(z, numbers, start)
         half = recursion.half_slopes(numbers, x, u)
         costate = self.form.costates(y, numbers, x[-1], half)
         sound = all(np.isfinite(a).all() for a in (x, u, costate))
         if not sound:
-            x, u = np.tile(data.x0, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
+            x, u = np.tile(start, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
             costate, status = np.zeros_like(x), Status.DIVERGED
-        return Solution(
-            problem=self.lq.ocp,
-            solver=self._name,
+        return run.solution(
+            self._name,
             status=status,
             message=message,
-            t=t0 + self.lq.nodes,
             x=x,
-            x0=data.x0,
-            costate=costate,
             u=u,
+            costate=costate,
             cost=recursion.cost(numbers, x, u, half) if sound else np.inf,
             residual=max(found),
             iterations=answer.iterations,
-            work=Work(rollouts=1, factorisations=answer.factorisations),
+            factorisations=answer.factorisations,
             history={
                 "primal": np.array([found.primal]),
                 "dual": np.array([found.dual]),
                 "gap": np.array([found.gap]),
                 "multipliers": y[self.form.equations :],
             },
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
     # -- pieces -----------------------------------------------------------------------------
@@ -195,13 +188,13 @@ class LinearMPCProgram(Program):
     def _name(self) -> str:
         return repr(self.solver)
 
-    def _programs(self, data: Data, numbers: LQData) -> tuple[QP, QP]:
+    def _programs(self, start: np.ndarray, numbers: LQData) -> tuple[QP, QP]:
         """Return the program with hard constraints, and the one to solve."""
         self.prepare(numbers.matrices)
         w = self._workspace
         assert w.hard is not None
         assert w.soft is not None
-        vectors = self.form.vectors(numbers, data.x0)
+        vectors = self.form.vectors(numbers, start)
         hard = w.hard.with_vectors(*vectors)
         if self.softening is None:
             return hard, hard

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from time import perf_counter
 from typing import Literal
 
 import numpy as np
@@ -11,19 +10,17 @@ from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
-    Data,
     LinearQuadratic,
     ProblemError,
     Program,
     Solution,
     Solver,
     Start,
-    Status,
-    Work,
     linear_quadratic,
     with_stationary_end,
 )
 from solvers.linear import recursion
+from solvers.linear.run import Run
 
 
 @dataclass(frozen=True)
@@ -107,26 +104,17 @@ class RiccatiProgram(Program):
         guess: Start | None = None,
     ) -> Solution:
         """Solve for these data; a guess is not needed."""
-        started = perf_counter()
-        data: Data = self.lq.data(x0, t0, parameters)
-        numbers = self.lq.on(data)
+        run = Run.of(self.lq, x0, t0, parameters)
+        numbers = run.numbers
         gains = self.fixed_gains or recursion.gains(numbers.matrices)
         p, k = recursion.affine_parts(gains, numbers)
-        x, u = recursion.roll(numbers, data.x0, gains.K, -k)
+        x, u = recursion.roll(numbers, run.data.x0, gains.K, -k)
         half = recursion.half_slopes(numbers, x, u)
-        ocp = self.lq.ocp
-        return Solution(
-            problem=ocp,
-            solver=repr(self.solver),
-            status=Status.SOLVED,
-            t=t0 + self.lq.nodes,
+        return run.solution(
+            repr(self.solver),
             x=x,
-            x0=data.x0,
-            costate=2.0 * (np.einsum("kij,kj->ki", gains.P, x) + p),
             u=u,
+            costate=2.0 * (np.einsum("kij,kj->ki", gains.P, x) + p),
             cost=recursion.cost(numbers, x, u, half),
-            iterations=1,
-            work=Work(rollouts=1, factorisations=self.lq.steps),
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
+            factorisations=self.lq.steps,
         )

@@ -21,10 +21,10 @@ from ocp import (
     Stage,
     Start,
     Status,
-    UnsupportedProblem,
     Work,
 )
 from solvers.tabular.one_step import OneStep, one_step
+from solvers.tabular.refusal import refuse_free_ends
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,7 @@ class Greedy(Solver):
 
     def build(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""
-        if ocp.has_free_time:
-            raise UnsupportedProblem(f"{ocp.name}: Greedy takes no free final time")
-        for c in ocp.at("initial"):
-            raise UnsupportedProblem(f"{ocp.name}: Greedy takes no free start ('{c.name}')")
+        refuse_free_ends(ocp, "Greedy")
         stage = Stage.of(ocp, self.integrator, held=True)
         n, options = ocp.steps or self.intervals, _options(self)
         inner, last = (one_step(ocp, stage, options, last=flag) for flag in (False, True))

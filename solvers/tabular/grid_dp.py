@@ -25,6 +25,7 @@ from ocp import (
 from solvers.tabular.bellman import Bellman, Table
 from solvers.tabular.grid import Axis, Grid
 from solvers.tabular.grid_policy import Run, follow
+from solvers.tabular.refusal import refuse_free_ends
 
 Points = int | tuple[int | Axis, ...]
 # Bytes that a pair of state and control takes: its cost, its sum and their temporaries ...
@@ -87,10 +88,7 @@ class GridDP(Solver):
 
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
-        if ocp.has_free_time:
-            raise UnsupportedProblem(f"{ocp.name}: GridDP takes no free final time")
-        for c in ocp.at("initial"):
-            raise UnsupportedProblem(f"{ocp.name}: GridDP takes no free start ('{c.name}')")
+        refuse_free_ends(ocp, "GridDP")
         self._refuse_equations(ocp)
         m = ocp.model
         states = _grid(self.states, ocp.state_bounds, m.x_names, "states")

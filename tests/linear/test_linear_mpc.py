@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import qpsolvers
 
-from benchmarks.closed_loop import feed_forward, receding_horizon
+from benchmarks.figures.mpc_runs import finite, peak, receding
 from models import (
     lq_regulator,
     mass_spring_damper,
@@ -34,13 +34,6 @@ def plant_step(dt: float = DT):
     return lambda x, u: plant.A @ x + plant.B @ u
 
 
-def closed_loop(steps: int, *, moving: bool = True, solver: LinearMPC | None = None):
-    program = (solver or LinearMPC()).build(thesis_tracking(steps, moving=moving))
-    reference = sinusoid(DT * np.arange(STEPS + steps + 1), moving=moving)
-    preview = lambda k: {"reference": reference[k : k + steps + 1]}  # noqa: E731
-    return receding_horizon(program, plant_step(), np.zeros(2), STEPS, preview=preview, dt=DT)
-
-
 def needs(backend: str) -> None:
     if backend not in qpsolvers.available_solvers:
         pytest.skip(f"{backend} is not installed")
@@ -50,26 +43,20 @@ def needs(backend: str) -> None:
 
 
 def test_constraints_hold_at_every_step_and_short_horizons_are_myopic():
-    ahead = solve(thesis_tracking(STEPS), LinearMPC())
-    finite = feed_forward(ahead, plant_step())
-    late = slice(round(0.5 / DT), None)
-    peaks = {0: np.abs(finite.u[late]).max()}
+    peaks = {0: peak(finite())}
     for steps in (5, 10, 20, 40):
-        run = closed_loop(steps)
-        peaks[steps] = np.abs(run.u[late]).max()
+        run = receding(steps, form="sparse")
+        peaks[steps] = peak(run)
         assert np.abs(run.x[:, 0]).max() <= BOUND + 1e-6
         assert np.abs(run.x[:, 0]).max() > BOUND - 1e-6, "the reference exceeds the bound"
-        assert np.abs(run.u).max() <= 40.0 + 1e-6
-    assert evaluate(ahead).violation <= 1e-6
+        assert np.abs(run.inputs).max() <= 40.0 + 1e-6
+    assert evaluate(solve(thesis_tracking(STEPS), LinearMPC())).violation <= 1e-6
     assert peaks[5] >= 1.15 * peaks[0]
     assert (peaks[5], peaks[0]) == pytest.approx((14.2, 11.7), abs=0.05)
 
 
 def test_a_reference_without_velocity_turns_the_order_round():
-    late = slice(round(0.5 / DT), None)
-    finite = solve(thesis_tracking(STEPS, moving=False), LinearMPC())
-    short = closed_loop(5, moving=False)
-    peaks = np.abs(short.u[late]).max(), np.abs(finite.u[late]).max()
+    peaks = peak(receding(5, moving=False, form="sparse")), peak(finite(moving=False))
     assert peaks == pytest.approx((7.1, 10.0), abs=0.1)
 
 

@@ -12,11 +12,9 @@ from ocp import (
     OCP,
     Box,
     Constraint,
-    FreeTime,
     Model,
     ProblemError,
     Status,
-    UnsupportedProblem,
     costates_along,
     evaluate,
     solve,
@@ -144,17 +142,6 @@ def test_more_terminal_equations_than_controls_print_nothing(capfd):
     assert solution.status is Status.INFEASIBLE
     assert "'ends'" in solution.message
     assert capfd.readouterr() == ("", "")
-
-
-def test_refusals():
-    x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    model = Model(name="walk", x=x, u=u, f=u)
-    given = {"name": "p", "model": model, "x0": 0.0, "running_cost": 1 + u**2}
-    with pytest.raises(UnsupportedProblem, match="free final time"):
-        Greedy().build(OCP(**given, horizon=FreeTime(guess=1.0)))
-    free = OCP(**given, horizon=1.0, constraints=(Constraint("c", x, 0.0, 0.0, at="initial"),))
-    with pytest.raises(UnsupportedProblem, match=r"free start \('c'\)"):
-        Greedy().build(free)
 
 
 @pytest.mark.parametrize("bad", [{"intervals": 0}, {"tolerance": 0.0}, {"max_iterations": 0}])

@@ -8,7 +8,6 @@ from ocp import (
     OCP,
     Box,
     Constraint,
-    FreeTime,
     Model,
     ProblemError,
     Status,
@@ -209,11 +208,6 @@ def test_refusals():
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
     model = Model(name="walk", x=x, u=u, f=u)
     given = {"name": "p", "model": model, "x0": 0.0, "running_cost": 1 + u**2}
-    with pytest.raises(UnsupportedProblem, match="free final time"):
-        GridDP().build(OCP(**given, horizon=FreeTime(guess=1.0)))
-    free = OCP(**given, horizon=1.0, constraints=(Constraint("c", x, 0.0, 0.0, at="initial"),))
-    with pytest.raises(UnsupportedProblem, match=r"free start \('c'\)"):
-        GridDP().build(free)
     path = OCP(**given, horizon=1.0, constraints=(Constraint("c", x + u, 0.0, 0.0),))
     with pytest.raises(UnsupportedProblem, match="path constraint 'c' is an equation"):
         GridDP().build(path)

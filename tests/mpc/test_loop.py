@@ -236,9 +236,9 @@ def test_what_does_not_fit_is_said() -> None:
         driver().run(Plant(ocp=cart()), START, 0.55)
     with pytest.raises(ProblemError, match="plant: x0 has 3 entries"):
         driver().run(Plant(ocp=cart()), [1.0, 0.0, 0.0], 0.5)
-    arm = MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, applied=Applied("rate"))
+    two = Law(law=lambda x, t: [0.0, 0.0])
     with pytest.raises(ProblemError, match="sends 2 inputs, the plant 'cart' takes 1"):
-        arm.run(Plant(ocp=cart()), START, 0.5)
+        closed_loop(two, Plant(ocp=cart()), START, 0.5, dt=DT)
     bad_plants: tuple[dict[str, Any], ...] = (
         {"lag": -1.0},
         {"jitter": 1.0},

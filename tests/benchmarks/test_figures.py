@@ -1,4 +1,4 @@
-"""The figures: drawn, with their data, and the claims made with them."""
+"""All figures: drawn, with their data, and the claims made with them."""
 
 import csv
 from collections.abc import Callable
@@ -82,7 +82,7 @@ def test_constraints_hold_and_the_short_horizon_pushes_hardest():
     moving, still = all_runs(), all_runs(moving=False)
     for loop in (*moving.values(), *still.values()):
         assert np.abs(loop.x[:, 0]).max() <= 2.0 + 1e-6
-        assert np.abs(loop.u).max() <= 40.0 + 1e-6
+        assert np.abs(loop.inputs).max() <= 40.0 + 1e-6
     assert peak(moving["N = 5"]) >= 1.15 * peak(moving["finite horizon"])
     assert peak(still["N = 5"]) < peak(still["finite horizon"])
 

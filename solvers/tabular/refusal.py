@@ -1,0 +1,11 @@
+"""What methods that go forward step by step from a given start cannot treat."""
+
+from ocp import OCP, UnsupportedProblem
+
+
+def refuse_free_ends(ocp: OCP, method: str) -> None:
+    """Raise ``UnsupportedProblem`` on a free final time or a free start."""
+    if ocp.has_free_time:
+        raise UnsupportedProblem(f"{ocp.name}: {method} takes no free final time")
+    for c in ocp.at("initial"):
+        raise UnsupportedProblem(f"{ocp.name}: {method} takes no free start ('{c.name}')")
