@@ -1,11 +1,12 @@
 """What is compared: each method is a solver with the start it is given."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 from benchmarks.cases import Case, Family
-from ocp import OCP, Evaluation, Guess, Solution, Solver, evaluate, solve
+from benchmarks.method import Method, Outcome, Settings, judged, problem
+from benchmarks.thesis_methods import SHOOTING_STEPS, THESIS_GUESS, thesis_methods
+from ocp import Guess, Solution, Solver, solve
 from solvers import (
     FixedStep,
     IndirectShooting,
@@ -17,83 +18,20 @@ from solvers import (
 )
 
 INTERVALS = 75
-# Two hundredths of a second per step, as the thesis simulates.
-SHOOTING_STEPS = 150
-# The thesis' first guess of psi(t0), in the sign of the minimum principle.
-THESIS_GUESS = (0.0, 10.0, -10.0)
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What a sweep sets for all methods.
-
-    Attributes:
-        starts: of the multi-start.
-        seed: of everything random.
-    """
-
-    starts: int = 10
-    seed: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a method returned.
-
-    Attributes:
-        solution: its answer.
-        verdict: the referee's, where it is not the usual one.
-        local_gap: how far the referee's cost lies above the local optimum that direct multiple
-            shooting reaches from this answer, relative; None where that is not asked.
-    """
-
-    solution: Solution
-    verdict: Evaluation
-    local_gap: float | None = None
-
-
-@dataclass(frozen=True)
-class Method:
-    """A row of the comparison.
-
-    Attributes:
-        name: what the tables call it.
-        family: which cases it runs on: those that declare the family.
-        suites: the suites it belongs to.
-        run: (case, settings) -> outcome.
-        settings: its options, as text, for the record.
-        about: one line for ``list``.
-    """
-
-    name: str
-    family: Family
-    suites: frozenset[str]
-    run: Callable[[Case, Settings], Outcome]
-    settings: str
-    about: str
-
-
-@lru_cache(maxsize=4)
-def _problem(case: Case) -> OCP:
-    return case.build()
 
 
 @lru_cache(maxsize=4)
 def _best_direct(case: Case, settings: Settings) -> LocalOptimum | None:
     """The best of several direct starts; several methods begin where it ends."""
-    found = multistart(_problem(case), MultipleShooting(INTERVALS), settings.starts, settings.seed)
+    found = multistart(problem(case), MultipleShooting(INTERVALS), settings.starts, settings.seed)
     return found[0] if found else None
-
-
-def _judged(solution: Solution) -> Outcome:
-    return Outcome(solution, evaluate(solution))
 
 
 def _plain(solver: Solver, guess: Guess | None = None) -> Callable[[Case, Settings], Outcome]:
     """The solver from a fixed first guess."""
 
     def run(case: Case, settings: Settings) -> Outcome:
-        return _judged(solve(_problem(case), solver, guess=guess))
+        return judged(solve(problem(case), solver, guess=guess))
 
     return run
 
@@ -103,7 +41,7 @@ def _from_direct(solver: Solver) -> Callable[[Case, Settings], Outcome]:
 
     def run(case: Case, settings: Settings) -> Outcome:
         best = _best_direct(case, settings)
-        return _judged(solve(_problem(case), solver, guess=best.solution if best else None))
+        return judged(solve(problem(case), solver, guess=best.solution if best else None))
 
     return run
 
@@ -112,12 +50,12 @@ def _multistart(case: Case, settings: Settings) -> Outcome:
     best = _best_direct(case, settings)
     if best is None:
         return _plain(MultipleShooting(INTERVALS))(case, settings)
-    return _judged(best.solution)
+    return judged(best.solution)
 
 
 def _polish(accuracy: float | None) -> Callable[[Case, Settings], Outcome]:
     def run(case: Case, settings: Settings) -> Outcome:
-        return _judged(polish(_multistart(case, settings).solution, accuracy=accuracy))
+        return judged(polish(_multistart(case, settings).solution, accuracy=accuracy))
 
     return run
 
@@ -137,7 +75,7 @@ def _with_local_gap(solver: Solver) -> Callable[[Case, Settings], Outcome]:
 
 
 def _plain_from(solver: Solver, case: Case, start: Solution) -> Outcome:
-    return _judged(solve(_problem(case), solver, guess=start))
+    return judged(solve(problem(case), solver, guess=start))
 
 
 def _method(
@@ -153,7 +91,13 @@ def _method(
 
 def all_methods() -> tuple[Method, ...]:
     """Return every method, in the order of the tables."""
-    return (*_direct_methods(), *_gradient_methods(), *_single_shooting(), *_multiple_shooting())
+    return (
+        *_direct_methods(),
+        *_gradient_methods(),
+        *_single_shooting(),
+        *_multiple_shooting(),
+        *thesis_methods(),
+    )
 
 
 def _direct_methods() -> tuple[Method, ...]:
@@ -162,7 +106,9 @@ def _direct_methods() -> tuple[Method, ...]:
     extremal = IndirectShooting(segments=15)
     suites, after = "arm textbook", "from direct-75"
     return (
-        _method("direct-75", "direct", suites, _multistart, coarse, "best of the starts"),
+        _method(
+            "direct-75", "direct", f"{suites} comparison", _multistart, coarse, "best of the starts"
+        ),
         _method("direct-150", "direct", suites, _from_direct(fine), fine, after),
         _method("fatrop-75", "direct", suites, _plain(fatrop), fatrop, "own start"),
         _method("polish", "polish", "arm", _polish(None), extremal, "direct-75 made extremal"),
@@ -172,7 +118,7 @@ def _direct_methods() -> tuple[Method, ...]:
 
 def _gradient_methods() -> tuple[Method, ...]:
     thesis, sound = Schuetz(step=FixedStep(0.01)), Schuetz.sound(intervals=INTERVALS)
-    suites = "arm textbook"
+    suites = "arm textbook comparison"
     return (
         _method("schuetz", "gradient", "arm", _with_local_gap(thesis), thesis, "Algorithm 2"),
         _method("schuetz-sound", "gradient", suites, _with_local_gap(sound), sound, "from zero"),
@@ -201,10 +147,10 @@ def _multiple_shooting() -> tuple[Method, ...]:
     exact = IndirectShooting(segments=15)
     varied = IndirectShooting(segments=15, jacobian="finite-difference")
 
-    def method(name: str, solver: Solver, about: str) -> Method:
-        return _method(name, "indirect", "arm links", _from_direct(solver), solver, about)
+    def method(name: str, suites: str, solver: Solver, about: str) -> Method:
+        return _method(name, "indirect", suites, _from_direct(solver), solver, about)
 
     return (
-        method("indirect-15", exact, "15 segments, from direct-75"),
-        method("indirect-15-fd", varied, "15 segments, from direct-75, Algorithm 1"),
+        method("indirect-15", "arm links comparison", exact, "15 segments, from direct-75"),
+        method("indirect-15-fd", "arm links", varied, "15 segments, from direct-75, Algorithm 1"),
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cases import Case
-from benchmarks.methods import Method, Outcome, Settings
+from benchmarks.method import Method, Outcome, Settings
 
 RESULTS = "results.jsonl"
 # A row counts as solved if its method says so and the referee finds no larger violation.

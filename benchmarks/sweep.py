@@ -12,7 +12,8 @@ from pathlib import Path
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.cases import Case, all_cases
-from benchmarks.methods import Method, Settings, all_methods
+from benchmarks.method import Method, Settings
+from benchmarks.methods import all_methods
 from benchmarks.row import RESULTS, Key, Row, mend, read_rows
 
 _POLL = 0.2  # [s]

@@ -1,6 +1,6 @@
 """The one problem library: benchmarks and tests take their problems from here."""
 
-from benchmarks.cases.arm import arm_cases, arm_scenario
+from benchmarks.cases.arm import arm_cases, arm_parts, arm_scenario, comparison_cases
 from benchmarks.cases.case import Case, Family
 from benchmarks.cases.links import link_cases
 from benchmarks.cases.textbook import TEXTBOOK
@@ -8,7 +8,17 @@ from benchmarks.cases.textbook import TEXTBOOK
 
 def all_cases() -> tuple[Case, ...]:
     """Return every case of every suite."""
-    return (*TEXTBOOK, *arm_cases(), *link_cases())
+    return (*TEXTBOOK, *arm_cases(), *link_cases(), *comparison_cases())
 
 
-__all__ = ["TEXTBOOK", "Case", "Family", "all_cases", "arm_cases", "arm_scenario", "link_cases"]
+__all__ = [
+    "TEXTBOOK",
+    "Case",
+    "Family",
+    "all_cases",
+    "arm_cases",
+    "arm_parts",
+    "arm_scenario",
+    "comparison_cases",
+    "link_cases",
+]
