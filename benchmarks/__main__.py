@@ -11,6 +11,7 @@ from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
+from benchmarks.comparison import SUITE as COMPARISON
 from benchmarks.comparison import comparison_claims, comparison_table
 from benchmarks.extremes import extremes_table
 from benchmarks.figures import FIGURES, chosen, draw_all
@@ -167,8 +168,8 @@ def _run(
         console.print("no solver declares these cases: nothing to run")
         return 2
     rows = sweep(tasks, out, workers=workers, resume=resume)
-    for suite in dict.fromkeys(row.suite for row in rows):
-        for kind in ("sum", "closest") if suite in ("arm", "comparison") else ("",):
+    for suite in dict.fromkeys(row.suite for row in rows if row.suite != COMPARISON):
+        for kind in ("sum", "closest") if suite == "arm" else ("",):
             here = [row for row in rows if row.suite == suite and row.case.endswith(kind)]
             if here:
                 console.print(table_of(here, f"{suite} {kind}".strip()))
