@@ -52,7 +52,7 @@ def costs(names: Sequence[str] = NAMES, horizons: Sequence[float] = HORIZONS) ->
         upper.semilogy(horizons, optimum, "k--", lw=1.2, label="certified optimum")
         label(upper, "", "cost L [rad²/s]", name)
         label(lower, "horizon [s]", "cost above the optimum [%]")
-    above[0, 0].legend(fontsize=8)
+    above[0].legend(fontsize=8)
     return Drawing(picture, columns, _sentence(horizons, gaps))
 
 

@@ -116,6 +116,6 @@ def _sentence(columns: dict[str, np.ndarray]) -> str:
         f"{ratio('integrations', DIRECT):.1f}, {ratio('integrations', SCHUETZ):.1f} and "
         f"{ratio('integrations', INDIRECT):.1f}. "
         f"Chosen here: {PER_NUMBER} scenarios for each number of links, total length 3 m, "
-        f"1.5 s, the cost summed over the links; best known: of the three methods. What is missing did "
-        "not converge."
+        f"1.5 s, the cost summed over the links; best known: of the three methods. "
+        "What is missing did not converge."
     )
