@@ -11,6 +11,8 @@ from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
+from benchmarks.comparison import SUITE as COMPARISON
+from benchmarks.comparison import comparison_claims, comparison_table
 from benchmarks.extremes import extremes_table
 from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.greedy_gap import greedy_table
@@ -166,12 +168,13 @@ def _run(
         console.print("no solver declares these cases: nothing to run")
         return 2
     rows = sweep(tasks, out, workers=workers, resume=resume)
-    for suite in dict.fromkeys(row.suite for row in rows):
+    for suite in dict.fromkeys(row.suite for row in rows if row.suite != COMPARISON):
         for kind in ("sum", "closest") if suite == "arm" else ("",):
             here = [row for row in rows if row.suite == suite and row.case.endswith(kind)]
             if here:
                 console.print(table_of(here, f"{suite} {kind}".strip()))
-    for table in (extremes_table(rows), jacobian_table(rows)):
+    compared = [comparison_table(rows, kind) for kind in ("closest", "sum")]
+    for table in (*compared, extremes_table(rows), jacobian_table(rows)):
         if table is not None:
             console.print(table)
     console.print(f"rows: {out / RESULTS}")
@@ -180,7 +183,7 @@ def _run(
 
 def _judge(console: Console, rows: Sequence[Row]) -> int:
     """Print the claims; return 1 if one fails or a reference is disproved."""
-    claims = claims_of(rows)
+    claims = (*claims_of(rows), *comparison_claims(rows))
     for claim in claims:
         console.print(f"{'holds' if claim.holds else 'FAILS'}: {claim.text} ({claim.evidence})")
     wrong = below_reference(rows)

@@ -1,10 +1,11 @@
-"""What a row of a comparison is: a solver, the start it is given, and what came of it."""
+"""What a method is, and what it returns."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from benchmarks.cases import Case, Family
-from ocp import Evaluation, Solution
+from ocp import OCP, Evaluation, Solution, evaluate
 
 
 @dataclass(frozen=True)
@@ -55,3 +56,14 @@ class Method:
     run: Callable[[Case, Settings], Outcome]
     settings: str
     about: str
+
+
+@lru_cache(maxsize=4)
+def problem(case: Case) -> OCP:
+    """Return the problem of a case, the same object for methods that follow each other."""
+    return case.build()
+
+
+def judged(solution: Solution) -> Outcome:
+    """Return a solution with the referee's verdict."""
+    return Outcome(solution, evaluate(solution))

@@ -6,8 +6,9 @@ from time import perf_counter
 
 from benchmarks.cases import Case, Family
 from benchmarks.clearance import clearance_methods
-from benchmarks.method import Method, Outcome, Settings
-from ocp import OCP, Guess, Solution, Solver, Status, evaluate, solve
+from benchmarks.method import Method, Outcome, Settings, judged, problem
+from benchmarks.thesis_methods import SHOOTING_STEPS, THESIS_GUESS, thesis_methods
+from ocp import Guess, Solution, Solver, Status, solve
 from solvers import (
     FixedStep,
     IndirectShooting,
@@ -22,33 +23,20 @@ from solvers import (
 INTERVALS = 75
 # Of the roots that a scan finds, the cheapest are made exact: the optimum is among them.
 ROOTS = 12
-# Two hundredths of a second per step, as the thesis simulates.
-SHOOTING_STEPS = 150
-# The thesis' first guess of psi(t0), in the sign of the minimum principle.
-THESIS_GUESS = (0.0, 10.0, -10.0)
-
-
-@lru_cache(maxsize=4)
-def _problem(case: Case) -> OCP:
-    return case.build()
 
 
 @lru_cache(maxsize=4)
 def _best_direct(case: Case, settings: Settings) -> LocalOptimum | None:
     """The best of several direct starts; several methods begin where it ends."""
-    found = multistart(_problem(case), MultipleShooting(INTERVALS), settings.starts, settings.seed)
+    found = multistart(problem(case), MultipleShooting(INTERVALS), settings.starts, settings.seed)
     return found[0] if found else None
-
-
-def _judged(solution: Solution) -> Outcome:
-    return Outcome(solution, evaluate(solution))
 
 
 def _plain(solver: Solver, guess: Guess | None = None) -> Callable[[Case, Settings], Outcome]:
     """The solver from a fixed first guess."""
 
     def run(case: Case, settings: Settings) -> Outcome:
-        return _judged(solve(_problem(case), solver, guess=guess))
+        return judged(solve(problem(case), solver, guess=guess))
 
     return run
 
@@ -58,7 +46,7 @@ def _from_direct(solver: Solver) -> Callable[[Case, Settings], Outcome]:
 
     def run(case: Case, settings: Settings) -> Outcome:
         best = _best_direct(case, settings)
-        return _judged(solve(_problem(case), solver, guess=best.solution if best else None))
+        return judged(solve(problem(case), solver, guess=best.solution if best else None))
 
     return run
 
@@ -67,12 +55,12 @@ def _multistart(case: Case, settings: Settings) -> Outcome:
     best = _best_direct(case, settings)
     if best is None:
         return _plain(MultipleShooting(INTERVALS))(case, settings)
-    return _judged(best.solution)
+    return judged(best.solution)
 
 
 def _polish(accuracy: float | None) -> Callable[[Case, Settings], Outcome]:
     def run(case: Case, settings: Settings) -> Outcome:
-        return _judged(polish(_multistart(case, settings).solution, accuracy=accuracy))
+        return judged(polish(_multistart(case, settings).solution, accuracy=accuracy))
 
     return run
 
@@ -80,11 +68,11 @@ def _polish(accuracy: float | None) -> Callable[[Case, Settings], Outcome]:
 def _cheapest_extremal(case: Case, settings: Settings) -> Outcome:
     """The best of the extremals that a scan finds; nothing of it is random."""
     started = perf_counter()
-    found = enumerate_extremals(_problem(case), keep=ROOTS).solutions
+    found = enumerate_extremals(problem(case), keep=ROOTS).solutions
     if not found:
-        none = solve(_problem(case), MultipleShooting(INTERVALS))
-        return _judged(none.with_(status=Status.FAILED, message="the scan found no extremal"))
-    return _judged(found[0].with_(solve_time=perf_counter() - started))
+        none = solve(problem(case), MultipleShooting(INTERVALS))
+        return judged(none.with_(status=Status.FAILED, message="the scan found no extremal"))
+    return judged(found[0].with_(solve_time=perf_counter() - started))
 
 
 def _with_local_gap(solver: Solver) -> Callable[[Case, Settings], Outcome]:
@@ -102,7 +90,7 @@ def _with_local_gap(solver: Solver) -> Callable[[Case, Settings], Outcome]:
 
 
 def _plain_from(solver: Solver, case: Case, start: Solution) -> Outcome:
-    return _judged(solve(_problem(case), solver, guess=start))
+    return judged(solve(problem(case), solver, guess=start))
 
 
 def _method(
@@ -124,6 +112,7 @@ def all_methods() -> tuple[Method, ...]:
         *_single_shooting(),
         *_multiple_shooting(),
         *clearance_methods(),
+        *thesis_methods(),
     )
 
 
@@ -133,7 +122,9 @@ def _direct_methods() -> tuple[Method, ...]:
     extremal = IndirectShooting(segments=15)
     suites, after = "arm textbook", "from direct-75"
     return (
-        _method("direct-75", "direct", suites, _multistart, coarse, "best of the starts"),
+        _method(
+            "direct-75", "direct", f"{suites} comparison", _multistart, coarse, "best of the starts"
+        ),
         _method("direct-150", "direct", suites, _from_direct(fine), fine, after),
         _method("fatrop-75", "direct", suites, _plain(fatrop), fatrop, "own start"),
         _method("polish", "polish", "arm", _polish(None), extremal, "direct-75 made extremal"),
@@ -144,7 +135,7 @@ def _direct_methods() -> tuple[Method, ...]:
 
 def _gradient_methods() -> tuple[Method, ...]:
     thesis, sound = Schuetz(step=FixedStep(0.01)), Schuetz.sound(intervals=INTERVALS)
-    suites = "arm textbook"
+    suites = "arm textbook comparison"
     return (
         _method("schuetz", "gradient", "arm", _with_local_gap(thesis), thesis, "Algorithm 2"),
         _method("schuetz-sound", "gradient", suites, _with_local_gap(sound), sound, "from zero"),
@@ -173,10 +164,10 @@ def _multiple_shooting() -> tuple[Method, ...]:
     exact = IndirectShooting(segments=15)
     varied = IndirectShooting(segments=15, jacobian="finite-difference")
 
-    def method(name: str, solver: Solver, about: str) -> Method:
-        return _method(name, "indirect", "arm links", _from_direct(solver), solver, about)
+    def method(name: str, suites: str, solver: Solver, about: str) -> Method:
+        return _method(name, "indirect", suites, _from_direct(solver), solver, about)
 
     return (
-        method("indirect-15", exact, "15 segments, from direct-75"),
-        method("indirect-15-fd", varied, "15 segments, from direct-75, Algorithm 1"),
+        method("indirect-15", "arm links comparison", exact, "15 segments, from direct-75"),
+        method("indirect-15-fd", "arm links", varied, "15 segments, from direct-75, Algorithm 1"),
     )

@@ -1,6 +1,6 @@
 """The one problem library: benchmarks and tests take their problems from here."""
 
-from benchmarks.cases.arm import arm_cases, arm_scenario
+from benchmarks.cases.arm import arm_cases, arm_parts, arm_scenario, comparison_cases
 from benchmarks.cases.case import Case, Family
 from benchmarks.cases.clearance import clearance_cases, required_clearance, soft_optimum
 from benchmarks.cases.links import link_cases
@@ -9,7 +9,13 @@ from benchmarks.cases.textbook import TEXTBOOK
 
 def all_cases() -> tuple[Case, ...]:
     """Return every case of every suite."""
-    return (*TEXTBOOK, *arm_cases(), *link_cases(), *clearance_cases())
+    return (
+        *TEXTBOOK,
+        *arm_cases(),
+        *comparison_cases(),
+        *link_cases(),
+        *clearance_cases(),
+    )
 
 
 __all__ = [
@@ -18,8 +24,10 @@ __all__ = [
     "Family",
     "all_cases",
     "arm_cases",
+    "arm_parts",
     "arm_scenario",
     "clearance_cases",
+    "comparison_cases",
     "link_cases",
     "required_clearance",
     "soft_optimum",

@@ -1,6 +1,7 @@
 """The 40 scenarios of the planar arm, with both distance costs."""
 
 import json
+from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 
@@ -13,6 +14,7 @@ _FAMILIES: dict[Combine, frozenset[Family]] = {
     "sum": frozenset({"direct", "gradient", "indirect", "polish"}),
     "closest": frozenset({"direct", "gradient"}),
 }
+_COMPARED = "compare-"
 
 
 @cache
@@ -60,3 +62,24 @@ def _build(name: str, combine: Combine) -> OCP:
 def arm_cases() -> tuple[Case, ...]:
     """Return all 80, ``sum`` first."""
     return tuple(_case(name, combine) for combine in _FAMILIES for name in _data())
+
+
+def comparison_cases() -> tuple[Case, ...]:
+    """Return the same 80 as a suite of their own, for the comparison of thesis 3.2.6.
+
+    There every method runs on both costs: the thesis shoots on the closest link's cost too.
+    """
+    every: frozenset[Family] = frozenset({"direct", "gradient", "indirect", "instantaneous"})
+    return tuple(
+        replace(case, name=_COMPARED + case.name, suite="comparison", families=every)
+        for case in arm_cases()
+    )
+
+
+def arm_parts(case: Case) -> tuple[ArmScenario, Combine]:
+    """Return the scenario of one of these cases, and its distance cost."""
+    name = case.name.removeprefix(_COMPARED)
+    for combine in _FAMILIES:
+        if name.endswith(f"-{combine}"):
+            return arm_scenario(name.removesuffix(f"-{combine}")), combine
+    raise KeyError(case.name)

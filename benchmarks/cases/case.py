@@ -6,7 +6,7 @@ from typing import Literal
 
 from ocp import OCP
 
-Family = Literal["direct", "gradient", "indirect", "polish", "clearance"]
+Family = Literal["direct", "gradient", "indirect", "polish", "clearance", "instantaneous"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,8 @@ from benchmarks.figures import (
     instantaneous,
     interval,
     newton_steps,
+    over_horizon,
+    over_links,
     predictive,
     regulation,
 )
@@ -68,8 +70,10 @@ FIGURES = (
     Figure("3.13a", "what makes it climb", descent.causes),
     Figure("3.13b", "its gap over the step length", descent_gap.over_step),
     Figure("3.13c", "its gap over the start", descent_gap.over_start),
+    Figure("3.15", "cost of all methods over the horizon", over_horizon.costs),
     Figure("3.16", "the cost function dilemma", dilemma.costs),
     Figure("basin", "the basins of single shooting", basin.basins),
+    Figure("links", "gap and effort over the number of links", over_links.links),
 )
 
 

@@ -16,7 +16,8 @@ from ocp import evaluate
 from solvers import KinematicRun, PrioritisedKinematics, Repulsion
 
 _SCENARIO = "arm-001"
-_REPULSION = Repulsion(v0=0.2, d_m=0.6, d_i=0.9)
+_INFLUENCE = 0.6  # [m]
+_REPULSION = Repulsion(v0=0.2, d_m=_INFLUENCE, d_i=0.9)
 _SAMPLING = 1e-3  # [s]
 _FEEDBACK = 100.0  # [1/s]
 _POSTURES = 8
@@ -78,7 +79,7 @@ def avoidance() -> Drawing:
     moved = runs["path, then obstacle"]
     film = partial(
         animate, scenario.arm, moved.t, moved.q,
-        obstacles=(scenario.disc,), influence=_REPULSION.d_m, title=scenario.name,
+        obstacles=(scenario.disc,), influence=_INFLUENCE, title=scenario.name,
     )  # fmt: skip
     return Drawing(picture, columns, _sentence(scenario, runs), film)
 
@@ -90,7 +91,7 @@ def _run(scenario: ArmScenario, controller: PrioritisedKinematics) -> KinematicR
 
 def _draw_arm(axes: Axes, scenario: ArmScenario, run: KinematicRun, name: str) -> None:
     chosen = np.linspace(0, len(run.q) - 1, _POSTURES).astype(int)
-    draw_obstacles(axes, (scenario.disc,), _REPULSION.d_m)
+    draw_obstacles(axes, (scenario.disc,), _INFLUENCE)
     draw_postures(axes, scenario.arm.positions(run.q[chosen]))
     metres(axes)
     axes.set_title(name, fontsize=10)

@@ -13,23 +13,23 @@ _RANK = 1e-6
 
 
 class Level(NamedTuple):
-    """A task at one instant.
+    """A task at one instant, of one arm or, with leading axes, of many at once.
 
     Attributes:
-        jacobian: J (m, n).
-        demand: what J dq/dt should be (m,).
-        activation: between 0 and 1.
+        jacobian: J (..., m, n).
+        demand: what J dq/dt should be (..., m).
+        activation: between 0 and 1 (...).
         inverse: how J N is inverted.
     """
 
     jacobian: np.ndarray
     demand: np.ndarray
-    activation: float
+    activation: float | np.ndarray
     inverse: Inverse
 
 
 def prioritised_velocity(levels: Sequence[Level], n: int, *, decoupled: bool) -> np.ndarray:
-    r"""Return dq/dt (n,) of tasks in strict order.
+    r"""Return dq/dt (..., n) of tasks in strict order.
 
     .. math::
 
@@ -49,11 +49,13 @@ def prioritised_velocity(levels: Sequence[Level], n: int, *, decoupled: bool) ->
     orthogonalisation and inversion: [An & Lee 2014]; the transition: [Lee, Mansard & Park 2012].
 
     Args:
-        levels: the first has the highest priority.
+        levels: the first has the highest priority; all with the same leading axes.
         n: number of joints.
         decoupled: see above.
     """
-    return _descend(list(levels), np.zeros(n), np.eye(n), decoupled)
+    many = np.shape(levels[0].activation) if levels else ()
+    velocity, free = np.zeros((*many, n)), np.broadcast_to(np.eye(n), (*many, n, n))
+    return _descend(list(levels), velocity, free, decoupled)
 
 
 def _descend(
@@ -62,15 +64,22 @@ def _descend(
     if not levels:
         return velocity
     level, lower = levels[0], levels[1:]
-    alpha = level.activation
-    if alpha <= 0.0:
+    alpha = np.asarray(level.activation)
+    if (alpha <= 0.0).all():
         return _descend(lower, velocity, free, decoupled)
     u, s, vt = np.linalg.svd(level.jacobian @ free, full_matrices=False)
+    v = vt.swapaxes(-1, -2)
     gains = level.inverse.gains(s)
-    missing = level.demand - level.jacobian @ velocity
-    moved = velocity + vt.T @ (gains * (u.T @ missing))
-    used = s > _RANK * np.linalg.norm(level.jacobian) if decoupled else gains * s
-    with_it = _descend(lower, moved, free - (vt.T * used) @ vt, decoupled)
-    if alpha >= 1.0:
+    missing = level.demand - _times(level.jacobian, velocity)
+    moved = velocity + _times(v, gains * _times(u.swapaxes(-1, -2), missing))
+    size = np.linalg.norm(level.jacobian, axis=(-2, -1))
+    used = s > _RANK * size[..., None] if decoupled else gains * s
+    with_it = _descend(lower, moved, free - (v * used[..., None, :]) @ vt, decoupled)
+    if (alpha >= 1.0).all():
         return with_it
-    return alpha * with_it + (1.0 - alpha) * _descend(lower, velocity, free, decoupled)
+    share = np.clip(alpha, 0.0, 1.0)[..., None]
+    return share * with_it + (1.0 - share) * _descend(lower, velocity, free, decoupled)
+
+
+def _times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    return (matrix @ vector[..., None])[..., 0]

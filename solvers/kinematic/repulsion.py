@@ -26,6 +26,9 @@ class Repulsion:
     Source: thesis (3.13)-(3.16) and figure 3.3, whose formulas it does not give;
     [Maciejewski & Klein 1985].
 
+    v0, d_m and d_i may be CasADi symbols, for tasks whose Jacobians and demands are compiled as
+    functions of them; then nobody checks their values.
+
     Args:
         v0: repulsive speed where α_v = 1, that is at d = d_m / √2 [m/s], positive.
         d_m: distance at which repulsion begins [m], positive.
@@ -36,18 +39,20 @@ class Repulsion:
         ProblemError: naming the number that is out of its range.
     """
 
-    v0: float
-    d_m: float
-    d_i: float
+    v0: float | ca.SX
+    d_m: float | ca.SX
+    d_i: float | ca.SX
     ceiling: float = 100.0
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         for name in ("v0", "d_m", "d_i", "ceiling"):
             value = getattr(self, name)
+            if isinstance(value, ca.SX) and name != "ceiling":
+                continue
             if not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
                 raise ProblemError(f"repulsion: {name} = {value!r}, a positive number is needed")
-        if self.d_i <= self.d_m:
+        if not isinstance(self.d_i <= self.d_m, ca.SX) and self.d_i <= self.d_m:
             raise ProblemError(
                 f"repulsion: d_i = {self.d_i} m must be larger than d_m = {self.d_m} m"
             )

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from benchmarks.cases import all_cases, arm_cases
-from benchmarks.methods import Settings, all_methods
+from benchmarks.method import Settings
+from benchmarks.methods import all_methods
 from benchmarks.row import RESULTS, read_rows
 from benchmarks.sweep import sweep, tasks_of
 
