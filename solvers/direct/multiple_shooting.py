@@ -26,6 +26,7 @@ from ocp import (
     Status,
     Transcription,
     Work,
+    compiled,
     instance,
     whole,
 )
@@ -58,6 +59,7 @@ class MultipleShooting(Solver):
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
+        compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
     """
 
     intervals: int = 75
@@ -67,6 +69,7 @@ class MultipleShooting(Solver):
     max_iterations: int = 300
     accuracy: float = 1e-2
     verbose: bool = False
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -83,11 +86,12 @@ class MultipleShooting(Solver):
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
-        transcription = Transcription(ocp, self.intervals, self.integrator)
+        transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         nlp = self.options.build(transcription)
         n, finer = transcription.n, replace(self.integrator, steps=2 * self.integrator.steps)
-        rollout = Stage.of(ocp, self.integrator, held=True).step.mapaccum(n)
-        check = Stage.of(ocp, finer, held=True).step.map(n)
+        halved = Stage.of(ocp, finer, held=True).step
+        check = (compiled(halved) if self.compiled else halved).map(n)
+        rollout = transcription.step.mapaccum(n)
         return MultipleShootingProgram(self, transcription, nlp, rollout, check)
 
 

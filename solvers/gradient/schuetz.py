@@ -24,6 +24,7 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    compiled,
     hamiltonian,
     instance,
     whole,
@@ -56,6 +57,7 @@ class Schuetz(Solver):
         decrease: second test: relative decrease below this, epsilon; 0: off.
         stop_on_rise: third test.
         stationarity: converged when the largest projected gradient falls below this.
+        compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
     """
 
     intervals: int = 75
@@ -67,6 +69,7 @@ class Schuetz(Solver):
     decrease: float = 1e-4
     stop_on_rise: bool = True
     stationarity: float = 1e-5
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -106,7 +109,10 @@ class Schuetz(Solver):
         sweep = (
             stage.adjoint if self.gradient == "discrete" else _costate_step(ocp, self.integrator)
         )
-        return SchuetzProgram(self, ocp, n, stage.step.mapaccum(n), sweep.mapaccum(n))
+        step = stage.step
+        if self.compiled:
+            step, sweep = compiled(step), compiled(sweep)
+        return SchuetzProgram(self, ocp, n, step.mapaccum(n), sweep.mapaccum(n))
 
 
 def _refuse_constraints(ocp: OCP) -> None:

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from ocp import OCP, Data, Integrator, Optimality, derive, interpolate, symbol_kind
+from ocp import OCP, Data, Integrator, Optimality, compiled, derive, interpolate, symbol_kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,14 +119,18 @@ class Extremals:
     starts: ca.Function
 
     @classmethod
-    def of(cls, ocp: OCP, segments: int, steps: int, integrator: Integrator) -> "Extremals":
-        """Do all symbolic work."""
+    def of(
+        cls, ocp: OCP, segments: int, steps: int, integrator: Integrator, *, fast: bool = False
+    ) -> "Extremals":
+        """Do all symbolic work; ``fast``: with the steps as machine code."""
         optimality = derive(ocp)
         starts, ends = _start_conditions(ocp, optimality), _end_conditions(ocp, optimality)
         shape = Shape(
             segments, ocp.model.nx, starts.size1_in(1), ends.size1_in(1), ocp.has_free_time
         )
         step, slope = _step(ocp, optimality, integrator)
+        if fast:
+            step, slope = compiled(step), compiled(slope)
         roll = step.mapaccum(steps).map(segments)
         return cls(ocp, optimality, shape, steps, roll, slope.map(segments * steps), ends, starts)
 
