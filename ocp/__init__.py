@@ -1,5 +1,6 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
+from ocp.buffered import Buffered
 from ocp.compile import Compiler, InterpretedWarning, compiled
 from ocp.constraint import Box, Constraint
 from ocp.data import Data
@@ -39,6 +40,7 @@ __all__ = [
     "RK4",
     "Applied",
     "Box",
+    "Buffered",
     "Compiler",
     "Constraint",
     "ControlRefused",

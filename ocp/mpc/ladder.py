@@ -72,6 +72,7 @@ class Ladder:
         backup: the law of the last rung; None: hold the last input.
         dt: sampling interval [s].
         tolerance: what still counts as inside.
+        compiled: whether the model runs as machine code.
     """
 
     ocp: OCP
@@ -81,6 +82,7 @@ class Ladder:
     backup: Backup | None
     dt: float
     tolerance: float
+    compiled: bool
     _rehearsals: dict[int, Rehearsal] = field(default_factory=dict)
 
     def solve(self, moment: Moment) -> tuple[Solution | None, Status | None]:
@@ -205,7 +207,7 @@ class Ladder:
     def _rehearsal(self, n: int) -> Rehearsal:
         """Roll-outs over n intervals, prepared once for each n."""
         if n not in self._rehearsals:
-            self._rehearsals[n] = Rehearsal(self.ocp, n)
+            self._rehearsals[n] = Rehearsal(self.ocp, n, self.compiled)
         return self._rehearsals[n]
 
     @cached_property

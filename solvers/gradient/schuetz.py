@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     RK4,
+    Buffered,
     Data,
     Euler,
     Integrator,
@@ -112,7 +113,7 @@ class Schuetz(Solver):
         step = stage.step
         if self.compiled:
             step, sweep = compiled(step), compiled(sweep)
-        return SchuetzProgram(self, ocp, n, step.mapaccum(n), sweep.mapaccum(n))
+        return SchuetzProgram(self, ocp, n, Buffered(step.mapaccum(n)), Buffered(sweep.mapaccum(n)))
 
 
 def _refuse_constraints(ocp: OCP) -> None:
@@ -167,8 +168,8 @@ class SchuetzProgram(Program):
     solver: Schuetz
     ocp: OCP
     n: int
-    rollout: ca.Function
-    sweep: ca.Function
+    rollout: Buffered
+    sweep: Buffered
 
     def run(
         self,
@@ -311,10 +312,10 @@ class _Descent:
         u = self.box.clip(u)
         x, costs = self.program.rollout(self.data.x0, u.T, *self.schedule)
         self.rollouts += 1
-        x = np.vstack([self.data.x0, np.array(x).T])
+        x = np.vstack([self.data.x0, x.T])
         t = self.data.t0 + self.program.ocp.duration
         final = float(self.program.ocp.functions.terminal_cost(x[-1], t, self.p_final))
-        cost = float(np.sum(np.array(costs))) + final
+        cost = float(np.sum(costs)) + final
         return Trial(u, x, cost if np.isfinite(cost) and np.isfinite(x).all() else np.inf)
 
     def _completed(self, trial: Trial) -> _Iterate:
@@ -328,11 +329,11 @@ class _Descent:
         states = [trial.x[:-1].T, trial.u.T]
         if self.solver.gradient == "continuous":
             states.insert(1, trial.x[1:].T)
-        backwards = [ca.DM(a[:, ::-1]) for a in (*states, *self.schedule)]
+        backwards = [a[:, ::-1] for a in (*states, *self.schedule)]
         costate, gradient = self.program.sweep(final, *backwards)
         self.sweeps += 1
-        costates = np.vstack([np.array(costate).T[::-1], final])
-        return _Iterate(trial, costates, np.array(gradient).T[::-1] / self.h)
+        costates = np.vstack([costate.T[::-1], final])
+        return _Iterate(trial, costates, gradient.T[::-1] / self.h)
 
     def _final_costate(self, x: np.ndarray) -> np.ndarray:
         t = self.data.t0 + self.program.ocp.duration
