@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -38,15 +39,17 @@ class _Buffers:
     """The memory of one function."""
 
     def __init__(self, function: ca.Function) -> None:
+        # Any: the type stubs ask for a size that the call does not take.
+        self._buffer: Any
         self._buffer, self.evaluate = function.buffer()
         self.inputs = [_Place(function.sparsity_in(i)) for i in range(function.n_in())]
         self.outputs = [_Place(function.sparsity_out(i)) for i in range(function.n_out())]
         for i, place in enumerate(self.inputs):
             if place.values.size:
-                self._buffer.set_arg(i, memoryview(place.values))
+                self._buffer.set_arg(i, place.values.data)
         for i, place in enumerate(self.outputs):
             if place.values.size:
-                self._buffer.set_res(i, memoryview(place.values))
+                self._buffer.set_res(i, place.values.data)
 
 
 class _Place:

@@ -14,6 +14,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import Any
 
 import casadi as ca
 
@@ -71,7 +72,7 @@ def compiled(
     The library is kept under a name made from the generated C, compiler, flags and processor:
     what was built once is loaded. It is built under a temporary name in the same folder and
     then renamed, so that two processes may build at once. Where it cannot be built or kept,
-    ``function`` itself comes back, and ``InterpretedWarning`` says why, once per reason.
+    the interpreted function comes back, and ``InterpretedWarning`` says why, once per reason.
 
     Meant for functions of the size of one stage; map them afterwards. A whole transcribed
     problem takes minutes to compile.
@@ -89,18 +90,21 @@ def compiled(
     for name in along:
         if name not in function.name_in():
             raise ProblemError(f"compiled: {function.name()} has no input '{name}'")
-    options = {"is_diff_in": [name in along for name in function.name_in()]} if along else {}
+    options = {}
+    if along:
+        options = {"is_diff_in": [name in along for name in function.name_in()]}
+        function = _tidied(function, options)
     try:
-        library = _library(_code(function, along, options), compiler or Compiler())
+        library = _library(_code(function, along), compiler or Compiler())
         return _loaded(function.name(), library, options)
     except _Unbuildable as reason:
         _announce(f"no compiled functions: {reason}. They run interpreted.")
         return function
 
 
-def _code(function: ca.Function, along: Sequence[str], options: dict) -> str:
+def _code(function: ca.Function, along: Sequence[str]) -> str:
     """Return the C of a function, and of what CasADi asks for to differentiate it twice."""
-    functions = [_tidied(function, options)]
+    functions = [_tidied(function)]
     if along:
         adjoint = functions[0].reverse(1)
         functions += [_tidied(f) for f in (functions[0].jacobian(), adjoint, adjoint.jacobian())]
@@ -117,12 +121,13 @@ def _tidied(function: ca.Function, options: dict | None = None) -> ca.Function:
     """Return a function with every common subexpression computed once; about 3/4 of the code."""
     if options is None:
         options = {"is_diff_in": function.is_diff_in(), "is_diff_out": function.is_diff_out()}
+    # Any: SX and MX, which the type stubs keep apart.
     is_scalar = function.is_a("SXFunction")
-    inputs = function.sx_in() if is_scalar else function.mx_in()
-    outputs = list(function.call(inputs, True, False))
+    inputs: Any = function.sx_in() if is_scalar else function.mx_in()
+    outputs: Any = function.call(inputs, True, False)
+    outputs = ca.cse(outputs) if is_scalar else outputs
     names = function.name_in(), function.name_out()
-    tidy = ca.cse(outputs) if is_scalar else outputs
-    return ca.Function(function.name(), inputs, tidy, *names, options)
+    return ca.Function(function.name(), inputs, outputs, *names, options)
 
 
 def _library(code: str, compiler: Compiler) -> Path:

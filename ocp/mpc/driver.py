@@ -1,7 +1,7 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -114,9 +114,11 @@ class MPC:
     @property
     def _fastest(self) -> Solver:
         """The solver, compiled where that is wanted and it can be."""
-        if self.compiled and "compiled" in (option.name for option in fields(self.solver)):
-            return replace(self.solver, compiled=True)
-        return self.solver
+        solver = self.solver
+        if not self.compiled or not is_dataclass(solver):
+            return solver
+        has_option = any(option.name == "compiled" for option in fields(solver))
+        return replace(solver, compiled=True) if has_option else solver
 
     @property
     def remembers(self) -> bool:

@@ -113,7 +113,9 @@ class Schuetz(Solver):
         step = stage.step
         if self.compiled:
             step, sweep = compiled(step), compiled(sweep)
-        return SchuetzProgram(self, ocp, n, Buffered(step.mapaccum(n)), Buffered(sweep.mapaccum(n)))
+        parts = (step.mapaccum(n), sweep.mapaccum(n))
+        ends = (ocp.functions.terminal_cost, ocp.functions.terminal_gradient)
+        return SchuetzProgram(self, ocp, n, *map(Buffered, (*parts, *ends)))
 
 
 def _refuse_constraints(ocp: OCP) -> None:
@@ -170,6 +172,8 @@ class SchuetzProgram(Program):
     n: int
     rollout: Buffered
     sweep: Buffered
+    final_cost: Buffered
+    final_gradient: Buffered
 
     def run(
         self,
@@ -314,8 +318,8 @@ class _Descent:
         self.rollouts += 1
         x = np.vstack([self.data.x0, x.T])
         t = self.data.t0 + self.program.ocp.duration
-        final = float(self.program.ocp.functions.terminal_cost(x[-1], t, self.p_final))
-        cost = float(np.sum(costs)) + final
+        final = self.program.final_cost(x[-1], t, self.p_final)[0]
+        cost = float(np.sum(costs) + final.item())
         return Trial(u, x, cost if np.isfinite(cost) and np.isfinite(x).all() else np.inf)
 
     def _completed(self, trial: Trial) -> _Iterate:
@@ -337,7 +341,7 @@ class _Descent:
 
     def _final_costate(self, x: np.ndarray) -> np.ndarray:
         t = self.data.t0 + self.program.ocp.duration
-        return np.array(self.program.ocp.functions.terminal_gradient(x, t, self.p_final)).ravel()
+        return self.program.final_gradient(x, t, self.p_final)[0].ravel()
 
     def _free_gradient(self, iterate: _Iterate) -> np.ndarray:
         """The gradient, without components that would only push into a bound."""
