@@ -56,22 +56,24 @@ class _Place:
     """One input or output: its nonzeros, column by column."""
 
     def __init__(self, sparsity: ca.Sparsity) -> None:
-        self.shape, self.values = sparsity.shape, np.zeros(sparsity.nnz())
+        rows, columns = self._shape = sparsity.shape
+        self.values = np.zeros(sparsity.nnz())
+        self._vectors = ((rows,), ()) if rows == columns == 1 else ((rows,),) * (columns == 1)
         self._where = None if sparsity.is_dense() else np.array(sparsity.find(), dtype=int)
+        self._dense = self.values if self._where is None else np.zeros(rows * columns)
+        self._matrix = self._dense.reshape(self._shape, order="F")
 
     def put(self, given: np.ndarray) -> None:
-        if given.size != self.shape[0] * self.shape[1] or given.shape not in (
-            self.shape,
-            self.shape[:1],
-            (),
-        ):
-            raise ValueError(f"an input has shape {given.shape}, {self.shape} is needed")
-        flat = given.ravel(order="F")
-        self.values[:] = flat if self._where is None else flat[self._where]
+        if given.shape == self._shape:
+            self._matrix[...] = given
+        elif given.shape in self._vectors:
+            self._dense[...] = given
+        else:
+            raise ValueError(f"an input has shape {given.shape}, {self._shape} is needed")
+        if self._where is not None:
+            self.values[:] = self._dense[self._where]
 
     def get(self) -> np.ndarray:
-        if self._where is None:
-            return self.values.reshape(self.shape, order="F").copy(order="K")
-        dense = np.zeros(self.shape[0] * self.shape[1])
-        dense[self._where] = self.values
-        return dense.reshape(self.shape, order="F")
+        if self._where is not None:
+            self._dense[self._where] = self.values
+        return self._matrix.copy(order="F")

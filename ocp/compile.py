@@ -42,11 +42,14 @@ class Compiler:
         flags: its options.
         cache: folder; None: ``ocp-toolkit`` in the user's cache folder (``$XDG_CACHE_HOME``
             where it is set).
+        optimised: up to so many characters of C. Beyond, a compiler would optimise for minutes,
+            and ``-O0`` is added to the flags: still several times faster than interpreted.
     """
 
     command: str | None = None
     flags: tuple[str, ...] = ("-O3", "-march=native")
     cache: Path | None = None
+    optimised: int = 800_000
 
     @property
     def found(self) -> list[str]:
@@ -57,6 +60,12 @@ class Compiler:
             if words and shutil.which(words[0]):
                 return words
         return []
+
+    def words(self, code: str) -> list[str]:
+        """Return command and flags for some C; empty where there is no compiler."""
+        if not (command := self.found):
+            return []
+        return [*command, *self.flags, *(["-O0"] if len(code) > self.optimised else [])]
 
     @property
     def folder(self) -> Path:
@@ -132,18 +141,18 @@ def _tidied(function: ca.Function, options: dict | None = None) -> ca.Function:
 
 def _library(code: str, compiler: Compiler) -> Path:
     """Return the library of some C code, built unless it is there."""
-    command = compiler.found
-    if not command:
+    words = compiler.words(code)
+    if not words:
         raise _Unbuildable(
             f"there is no compiler '{compiler.command or os.environ.get('CC') or 'cc'}'"
         )
-    what = [code, *command, *compiler.flags, _version(tuple(command)), _processor()]
+    what = [code, *words, _version(tuple(compiler.found)), _processor()]
     key = sha256("\0".join(what).encode()).hexdigest()
     library = compiler.folder / f"{key[:32]}{_SUFFIX}"
     if not library.exists():
         try:
             compiler.folder.mkdir(parents=True, exist_ok=True)
-            _build(code, [*command, *compiler.flags], library)
+            _build(code, words, library)
         except OSError as error:
             raise _Unbuildable(f"{compiler.folder} cannot be written ({error})") from error
     return library

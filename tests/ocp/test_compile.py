@@ -123,6 +123,14 @@ def test_other_flags_and_other_code_make_other_libraries(tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
+@needs_compiler
+def test_long_code_is_not_optimised(tmp_path):
+    short, long = Compiler(cache=tmp_path), Compiler(cache=tmp_path, optimised=100)
+    assert "-O0" not in short.words("int x;")
+    assert long.words("int x;" * 100)[-1] == "-O0"
+    assert_same(pendulum(), compiled(pendulum(), compiler=long), 0)
+
+
 BUILD = """
 import sys
 from pathlib import Path
