@@ -48,7 +48,9 @@ class Box:
 
     def excess(self, value: np.ndarray) -> np.ndarray:
         """Return by how much each component lies outside: 0 inside, inf where it is no number."""
-        outside = np.maximum(0.0, np.maximum(self.lower - value, value - self.upper))
+        outside = np.maximum(
+            0.0, np.maximum(np.subtract(self.lower, value), np.subtract(value, self.upper))
+        )
         return np.where(np.isnan(outside), np.inf, outside)
 
 
