@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench | figures | speed | greedy``."""
+"""``python -m benchmarks list | run | bench | figures | speed | arm-speed | greedy``."""
 
 import argparse
 import sys
@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from benchmarks.arm_speed import INTERVALS, LINKS
+from benchmarks.arm_speed_tables import print_arm_speed
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
 from benchmarks.comparison import SUITE as COMPARISON
@@ -53,6 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "speed":
         print_speed(console, options.horizons, options.count)
         return 0
+    if options.command == "arm-speed":
+        print_arm_speed(console, options.intervals, options.links, options.count)
+        return 0
     if options.command == "greedy":
         console.print(greedy_table())
         return 0
@@ -86,6 +91,10 @@ def _parser() -> argparse.ArgumentParser:
     speed = commands.add_parser("speed", help="linear control: a step over N, and beside qpmpc")
     speed.add_argument("--horizons", nargs="+", type=_positive, default=HORIZONS, metavar="N")
     speed.add_argument("--count", type=_positive, default=20, metavar="K", help="steps measured")
+    arm = commands.add_parser("arm-speed", help="MPC on the arm: a step interpreted, compiled")
+    arm.add_argument("--intervals", nargs="*", type=_positive, default=INTERVALS, metavar="N")
+    arm.add_argument("--links", nargs="*", type=_positive, default=LINKS, metavar="n")
+    arm.add_argument("--count", type=_positive, default=40, metavar="K", help="steps measured")
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
     for command in (run, bench, figures):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")

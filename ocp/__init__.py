@@ -1,5 +1,7 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
+from ocp.buffered import Buffered
+from ocp.compile import Compiler, InterpretedWarning, compiled
 from ocp.constraint import Box, Constraint
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
@@ -38,6 +40,8 @@ __all__ = [
     "RK4",
     "Applied",
     "Box",
+    "Buffered",
+    "Compiler",
     "Constraint",
     "ControlRefused",
     "Controller",
@@ -51,6 +55,7 @@ __all__ = [
     "Guess",
     "Hamiltonian",
     "Integrator",
+    "InterpretedWarning",
     "LQData",
     "Law",
     "LinearQuadratic",
@@ -82,6 +87,7 @@ __all__ = [
     "UnsupportedProblem",
     "Work",
     "closed_loop",
+    "compiled",
     "costates_along",
     "derive",
     "discretise",

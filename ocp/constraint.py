@@ -1,6 +1,7 @@
 """Bounds and constraints, each with a name a message can use."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import casadi as ca
@@ -35,20 +36,22 @@ class Box:
             raise ProblemError(f"{what}[{i}]: no number lies between {lower[i]} and {upper[i]}")
         return Box(lower, upper)
 
-    @property
+    @cached_property
     def is_active(self) -> bool:
         """Whether any component is bounded at all."""
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
     def clip(self, value: np.ndarray) -> np.ndarray:
         """Return the nearest point of the box, along the last axis."""
-        return np.clip(value, np.asarray(self.lower, float), np.asarray(self.upper, float))
+        # np.clip and np.nan_to_num cost several times what they do to a short row.
+        return np.minimum(np.maximum(value, self.lower), self.upper)
 
     def excess(self, value: np.ndarray) -> np.ndarray:
         """Return by how much each component lies outside: 0 inside, inf where it is no number."""
-        below = np.asarray(self.lower, float) - value
-        above = value - np.asarray(self.upper, float)
-        return np.nan_to_num(np.maximum(0.0, np.maximum(below, above)), nan=np.inf)
+        outside = np.maximum(
+            0.0, np.maximum(np.subtract(self.lower, value), np.subtract(value, self.upper))
+        )
+        return np.where(np.isnan(outside), np.inf, outside)
 
 
 @dataclass(frozen=True, eq=False)

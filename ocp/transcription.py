@@ -7,6 +7,7 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
+from ocp.compile import compiled
 from ocp.constraint import Constraint
 from ocp.data import Data
 from ocp.functions import stacked
@@ -45,11 +46,13 @@ class Transcription:
         ocp: the problem.
         intervals: number of intervals N; a discrete-time problem brings its own.
         integrator: one-step method of each interval.
+        compiled: whether stage and path constraints run as machine code.
     """
 
     ocp: OCP
     intervals: int
     integrator: Integrator
+    compiled: bool = False
 
     # -- layout -----------------------------------------------------------------------
 
@@ -82,6 +85,25 @@ class Transcription:
         stages = w[: -self.nz].reshape(self.n, -1)
         return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
 
+    # -- the stage ----------------------------------------------------------------------
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """One interval: (x, u, t, h, p0, p1) -> (x after it, cost), ``Stage.step``."""
+        return self._fast(Stage.of(self.ocp, self.integrator, held=True).step)
+
+    @cached_property
+    def _path(self) -> ca.Function:
+        path = self.ocp.functions.path
+        return self._fast(path) if path.numel_out(0) else path
+
+    def _fast(self, function: ca.Function) -> ca.Function:
+        """Compile, where asked for, with derivatives along what depends on the unknowns."""
+        if not self.compiled:
+            return function
+        unknown = {"x", "u", "u0"} | ({"t", "h"} if self.ocp.has_free_time else set())
+        return compiled(function, along=[n for n in function.name_in() if n in unknown])
+
     # -- the program --------------------------------------------------------------------
 
     @cached_property
@@ -107,12 +129,10 @@ class Transcription:
         h = duration / n
         t = t0 + h * ca.DM(np.arange(n)).T
         t_final = t0 + (z[nx, -1] if ocp.has_free_time else ocp.duration)
-        after, costs = Stage.of(ocp, self.integrator, held=True).step.map(n)(
-            x[:, :-1], u, t, h, p_left, p_right
-        )
+        after, costs = self.step.map(n)(x[:, :-1], u, t, h, p_left, p_right)
         if ocp.has_free_time:
             after = ca.vertcat(after, duration)
-        inside = ocp.functions.path.map(n)(x[:, :-1], u, t, p_left)
+        inside = self._path.map(n)(x[:, :-1], u, t, p_left)
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         by_stage = ca.vertcat(z[:, 1:] - after, inside)
         g = ca.vertcat(

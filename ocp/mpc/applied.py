@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 
+from ocp.buffered import Buffered
+from ocp.cache import once_per_problem
 from ocp.constraint import Box
 from ocp.errors import ProblemError
 from ocp.problem import OCP
@@ -50,4 +52,9 @@ class Applied:
         """Return the input for a state and a control of the problem."""
         if self.what == "control":
             return u
-        return np.array(ocp.functions.rate(x, u, t, p)).ravel()
+        return _rate(ocp)(x, u, t, p)[0].ravel()
+
+
+@once_per_problem
+def _rate(ocp: OCP) -> Buffered:
+    return Buffered(ocp.functions.rate)

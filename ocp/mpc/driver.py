@@ -1,7 +1,7 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -64,6 +64,8 @@ class MPC:
         budget: time for a step [s]; None: unlimited.
         tolerance: by how much an input may leave its bounds, or a plan the constraints, before
             that is a failure; an input that leaves them by less is clipped, and it is recorded.
+        compiled: whether the solver, where it has such an option, and the model run as machine
+            code. The first build takes seconds; see ``compiled``.
 
     Raises:
         ProblemError: if interval, delay, budget or bounds do not fit the problem.
@@ -82,6 +84,7 @@ class MPC:
     compensate: bool = True
     budget: float | None = None
     tolerance: float = 1e-6
+    compiled: bool = True
 
     def __post_init__(self) -> None:
         """Check the numbers, and do all symbolic work."""
@@ -90,12 +93,13 @@ class MPC:
         self.memory = Memory()
         self._ladder = Ladder(
             ocp=self.ocp,
-            program=self.solver.build(self.ocp),
+            program=self._fastest.build(self.ocp),
             applied=self.applied,
             backup=self.backup,
             guess=self.guess,
             dt=self.dt,
             tolerance=self.tolerance,
+            compiled=self.compiled,
         )
 
     def _check(self) -> None:
@@ -119,6 +123,15 @@ class MPC:
             raise ProblemError(f"MPC of {name}: budget = {self.budget} s, it must be positive")
         if not self.tolerance >= 0.0:
             raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
+
+    @property
+    def _fastest(self) -> Solver:
+        """The solver, compiled where that is wanted and it can be."""
+        solver = self.solver
+        if not self.compiled or not is_dataclass(solver):
+            return solver
+        has_option = any(option.name == "compiled" for option in fields(solver))
+        return replace(solver, compiled=True) if has_option else solver
 
     @property
     def remembers(self) -> bool:

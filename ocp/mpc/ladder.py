@@ -72,6 +72,7 @@ class Ladder:
         backup: the law of the last rung; None: hold the last input.
         dt: sampling interval [s].
         tolerance: what still counts as inside.
+        compiled: whether the model runs as machine code.
     """
 
     ocp: OCP
@@ -81,6 +82,7 @@ class Ladder:
     backup: Rule | None
     dt: float
     tolerance: float
+    compiled: bool
     _rehearsals: dict[int, Rehearsal] = field(default_factory=dict)
 
     def solve(self, moment: Moment) -> tuple[Solution | None, Status | None]:
@@ -153,7 +155,7 @@ class Ladder:
     def _excess(self, plan: Solution, moment: Moment) -> tuple[float, str]:
         """Return by how much a new plan violates the constraints; inf where it is none."""
         if plan.status.is_success:
-            u, ends = controls(plan, plan.t[:-1]), self._ends(moment, plan.t)
+            u, ends = plan.u[: len(plan.t) - 1], self._ends(moment, plan.t)
             return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
         if plan.status in _USABLE:
             return self._rehearsed(plan, moment)
@@ -211,7 +213,7 @@ class Ladder:
     def _rehearsal(self, n: int) -> Rehearsal:
         """Roll-outs over n intervals, prepared once for each n."""
         if n not in self._rehearsals:
-            self._rehearsals[n] = Rehearsal(self.ocp, n)
+            self._rehearsals[n] = Rehearsal(self.ocp, n, self.compiled)
         return self._rehearsals[n]
 
     @cached_property

@@ -78,7 +78,7 @@ class FlightRecorder:
             self._last = plan
         entry["arrays"] = {name: np.shape(array) for name, array in arrays.items()}
         body = b"".join(np.ascontiguousarray(a, dtype=float).tobytes() for a in arrays.values())
-        self._file.write(json.dumps(entry).encode() + b"\n" + body)
+        self._file.write(b"%s\n%s" % (json.dumps(entry).encode(), body))
         self._file.flush()
 
 

@@ -7,6 +7,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ocp.buffered import Buffered
+from ocp.cache import once_per_problem
+from ocp.compile import compiled
 from ocp.constraint import Box
 from ocp.integrate import RK4, Stage
 from ocp.problem import OCP
@@ -43,10 +46,12 @@ class Rehearsal:
     Attributes:
         ocp: the problem.
         n: number of intervals.
+        compiled: whether the model runs as machine code.
     """
 
     ocp: OCP
     n: int
+    compiled: bool = False
 
     def of(self, x0: np.ndarray, u: np.ndarray, t: np.ndarray, p: Ends) -> Trial:
         """Roll controls u (N, nu), held between the instants t (N + 1,), out from x0 (nx,).
@@ -56,10 +61,10 @@ class Rehearsal:
         left, right = p
         inputs = (u.T, t[None, :-1], np.diff(t)[None, :], left.T, right.T)
         x, cost = self._rollout(x0, *inputs)
-        states = np.vstack([x0, np.array(x).T])
+        states = np.vstack([x0, x.T])
         if not np.isfinite(states).all():
             return Trial(np.tile(x0, (self.n + 1, 1)), np.inf, np.inf, "the state blows up")
-        return Trial(states, float(np.sum(np.array(cost))), *self.excess(states, u, t, p))
+        return Trial(states, float(np.sum(cost)), *self.excess(states, u, t, p))
 
     def excess(self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: Ends) -> tuple[float, str]:
         """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
@@ -71,19 +76,20 @@ class Rehearsal:
             found.append(_largest("control", m.u_names, ocp.control_bounds.excess(u)))
         if self._path_names:
             nodes = np.vstack([p[0], p[1][-1:]])
-            rows = np.array(self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)).T
+            rows = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
             excess = self._path_box.excess(rows)
             excess[0, ~ocp.functions.path_on_control] = 0.0
             found.append(_largest("constraint", self._path_names, excess))
         return max(found)
 
     @cached_property
-    def _rollout(self) -> ca.Function:
-        return Stage.of(self.ocp, RK4(), held=True).step.mapaccum(self.n)
+    def _rollout(self) -> Buffered:
+        step = (_compiled_step if self.compiled else _step)(self.ocp)
+        return Buffered(step.mapaccum(self.n))
 
     @cached_property
-    def _path(self) -> ca.Function:
-        return self.ocp.functions.path.map(self.n + 1)
+    def _path(self) -> Buffered:
+        return Buffered(self.ocp.functions.path.map(self.n + 1))
 
     @cached_property
     def _path_names(self) -> tuple[str, ...]:
@@ -92,6 +98,16 @@ class Rehearsal:
     @cached_property
     def _path_box(self) -> Box:
         return stacked_box(self.ocp.at("path"))
+
+
+@once_per_problem
+def _step(ocp: OCP) -> ca.Function:
+    return Stage.of(ocp, RK4(), held=True).step
+
+
+@once_per_problem
+def _compiled_step(ocp: OCP) -> ca.Function:
+    return compiled(_step(ocp))
 
 
 def _largest(kind: str, names: tuple[str, ...], excess: np.ndarray) -> tuple[float, str]:

@@ -14,10 +14,12 @@ def shifted(plan: Solution, t0: float) -> Guess:
     value (what the transversality condition makes them anyway).
     """
     times = plan.t - plan.t[0] + t0
-    x = _along(times, plan.t, plan.x)
+    nx = plan.x.shape[1]
+    both = _along(times, plan.t, np.hstack([plan.x, plan.costate]))
+    x, costate = both[:, :nx], both[:, nx:]
     beyond = np.maximum(times - plan.t[-1], 0.0)[:, None]
-    x += beyond * (plan.x[-1] - plan.x[-2]) / (plan.t[-1] - plan.t[-2])
-    return Guess(x=x, u=controls(plan, times), costate=_along(times, plan.t, plan.costate))
+    x += beyond * ((plan.x[-1] - plan.x[-2]) / (plan.t[-1] - plan.t[-2]))
+    return Guess(x=x, u=controls(plan, times), costate=costate)
 
 
 def controls(plan: Solution, times: np.ndarray) -> np.ndarray:
@@ -28,9 +30,15 @@ def controls(plan: Solution, times: np.ndarray) -> np.ndarray:
     """
     if plan.control_kind == "held":
         index = np.searchsorted(plan.t, times + 1e-9 * plan.duration, side="right") - 1
-        return plan.u[np.clip(index, 0, len(plan.u) - 1)]
+        return plan.u[np.minimum(np.maximum(index, 0), len(plan.u) - 1)]
     return _along(times, plan.t, plan.u)
 
 
 def _along(times: np.ndarray, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(times, nodes, column) for column in rows.T], axis=1)
+    """``np.interp`` of all columns at once."""
+    left = np.searchsorted(nodes, times, side="right") - 1
+    left = np.minimum(np.maximum(left, 0), len(nodes) - 2)
+    share = (times - nodes[left]) / (nodes[left + 1] - nodes[left])
+    share = np.minimum(np.maximum(share, 0.0), 1.0)[:, None]
+    below = rows[left]
+    return below + share * (rows[left + 1] - below)

@@ -6,7 +6,6 @@ from functools import cached_property
 from time import perf_counter
 from typing import Literal
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,6 +13,7 @@ from ocp import (
     OCP,
     RK4,
     Box,
+    Buffered,
     Data,
     Integrator,
     ProblemError,
@@ -26,6 +26,7 @@ from ocp import (
     Status,
     Transcription,
     Work,
+    compiled,
     instance,
     whole,
 )
@@ -58,6 +59,7 @@ class MultipleShooting(Solver):
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
+        compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
     """
 
     intervals: int = 75
@@ -67,6 +69,7 @@ class MultipleShooting(Solver):
     max_iterations: int = 300
     accuracy: float = 1e-2
     verbose: bool = False
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -83,11 +86,12 @@ class MultipleShooting(Solver):
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
-        transcription = Transcription(ocp, self.intervals, self.integrator)
+        transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         nlp = self.options.build(transcription)
         n, finer = transcription.n, replace(self.integrator, steps=2 * self.integrator.steps)
-        rollout = Stage.of(ocp, self.integrator, held=True).step.mapaccum(n)
-        check = Stage.of(ocp, finer, held=True).step.map(n)
+        halved = Stage.of(ocp, finer, held=True).step
+        check = Buffered((compiled(halved) if self.compiled else halved).map(n))
+        rollout = Buffered(transcription.step.mapaccum(n))
         return MultipleShootingProgram(self, transcription, nlp, rollout, check)
 
 
@@ -106,8 +110,8 @@ class MultipleShootingProgram(Program):
     solver: MultipleShooting
     transcription: Transcription
     nlp: Nlp
-    rollout: ca.Function
-    check: ca.Function
+    rollout: Buffered
+    check: Buffered
 
     def run(
         self,
@@ -169,7 +173,7 @@ class MultipleShootingProgram(Program):
         u = ocp.control_bounds.clip(np.zeros((tr.n, m.nu)) if u is None else u)
         if x is None:
             x, _ = self.rollout(data.x0, u.T, *self._schedule(data, duration))
-            x = np.vstack([data.x0, np.array(x).T])
+            x = np.vstack([data.x0, x.T])
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (tr.n + 1, 1))
         z = np.hstack([x, np.full((tr.n + 1, 1), duration)]) if ocp.has_free_time else x
@@ -227,7 +231,7 @@ class MultipleShootingProgram(Program):
         z, u = tr.split(answer.w)
         x = z[:, : tr.ocp.model.nx]
         after, _ = self.check(x[:-1].T, u.T, *self._schedule(data, self._duration(answer)))
-        moved = np.abs(np.array(after).T - x[1:]) / (1.0 + np.abs(x[1:]))
+        moved = np.abs(after.T - x[1:]) / (1.0 + np.abs(x[1:]))
         worst = int(moved.max(axis=1).argmax())
         return float(moved[worst].max()), worst + 1
 

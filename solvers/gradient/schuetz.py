@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     RK4,
+    Buffered,
     Data,
     Euler,
     Integrator,
@@ -24,6 +25,7 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    compiled,
     hamiltonian,
     instance,
     whole,
@@ -56,6 +58,7 @@ class Schuetz(Solver):
         decrease: second test: relative decrease below this, epsilon; 0: off.
         stop_on_rise: third test.
         stationarity: converged when the largest projected gradient falls below this.
+        compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
     """
 
     intervals: int = 75
@@ -67,6 +70,7 @@ class Schuetz(Solver):
     decrease: float = 1e-4
     stop_on_rise: bool = True
     stationarity: float = 1e-5
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -106,7 +110,12 @@ class Schuetz(Solver):
         sweep = (
             stage.adjoint if self.gradient == "discrete" else _costate_step(ocp, self.integrator)
         )
-        return SchuetzProgram(self, ocp, n, stage.step.mapaccum(n), sweep.mapaccum(n))
+        step = stage.step
+        if self.compiled:
+            step, sweep = compiled(step), compiled(sweep)
+        parts = (step.mapaccum(n), sweep.mapaccum(n))
+        ends = (ocp.functions.terminal_cost, ocp.functions.terminal_gradient)
+        return SchuetzProgram(self, ocp, n, *map(Buffered, (*parts, *ends)))
 
 
 def _refuse_constraints(ocp: OCP) -> None:
@@ -161,8 +170,10 @@ class SchuetzProgram(Program):
     solver: Schuetz
     ocp: OCP
     n: int
-    rollout: ca.Function
-    sweep: ca.Function
+    rollout: Buffered
+    sweep: Buffered
+    final_cost: Buffered
+    final_gradient: Buffered
 
     def run(
         self,
@@ -305,10 +316,10 @@ class _Descent:
         u = self.box.clip(u)
         x, costs = self.program.rollout(self.data.x0, u.T, *self.schedule)
         self.rollouts += 1
-        x = np.vstack([self.data.x0, np.array(x).T])
+        x = np.vstack([self.data.x0, x.T])
         t = self.data.t0 + self.program.ocp.duration
-        final = float(self.program.ocp.functions.terminal_cost(x[-1], t, self.p_final))
-        cost = float(np.sum(np.array(costs))) + final
+        final = self.program.final_cost(x[-1], t, self.p_final)[0]
+        cost = float(np.sum(costs) + final.item())
         return Trial(u, x, cost if np.isfinite(cost) and np.isfinite(x).all() else np.inf)
 
     def _completed(self, trial: Trial) -> _Iterate:
@@ -322,15 +333,15 @@ class _Descent:
         states = [trial.x[:-1].T, trial.u.T]
         if self.solver.gradient == "continuous":
             states.insert(1, trial.x[1:].T)
-        backwards = [ca.DM(a[:, ::-1]) for a in (*states, *self.schedule)]
+        backwards = [a[:, ::-1] for a in (*states, *self.schedule)]
         costate, gradient = self.program.sweep(final, *backwards)
         self.sweeps += 1
-        costates = np.vstack([np.array(costate).T[::-1], final])
-        return _Iterate(trial, costates, np.array(gradient).T[::-1] / self.h)
+        costates = np.vstack([costate.T[::-1], final])
+        return _Iterate(trial, costates, gradient.T[::-1] / self.h)
 
     def _final_costate(self, x: np.ndarray) -> np.ndarray:
         t = self.data.t0 + self.program.ocp.duration
-        return np.array(self.program.ocp.functions.terminal_gradient(x, t, self.p_final)).ravel()
+        return self.program.final_gradient(x, t, self.p_final)[0].ravel()
 
     def _free_gradient(self, iterate: _Iterate) -> np.ndarray:
         """The gradient, without components that would only push into a bound."""

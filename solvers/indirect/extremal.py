@@ -6,7 +6,17 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from ocp import OCP, Data, Integrator, Optimality, derive, interpolate, symbol_kind
+from ocp import (
+    OCP,
+    Buffered,
+    Data,
+    Integrator,
+    Optimality,
+    compiled,
+    derive,
+    interpolate,
+    symbol_kind,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,22 +135,27 @@ class Extremals:
     optimality: Optimality
     shape: Shape
     steps: int
-    roll: ca.Function
-    slopes: ca.Function
+    roll: Buffered
+    slopes: Buffered
     ends: ca.Function
     starts: ca.Function
 
     @classmethod
-    def of(cls, ocp: OCP, segments: int, steps: int, integrator: Integrator) -> "Extremals":
-        """Do all symbolic work."""
+    def of(
+        cls, ocp: OCP, segments: int, steps: int, integrator: Integrator, *, fast: bool = False
+    ) -> "Extremals":
+        """Do all symbolic work; ``fast``: with the steps as machine code."""
         optimality = derive(ocp)
         starts, ends = _start_conditions(ocp, optimality), _end_conditions(ocp, optimality)
         shape = Shape(
             segments, ocp.model.nx, starts.size1_in(1), ends.size1_in(1), ocp.has_free_time
         )
         step, slope = _step(ocp, optimality, integrator)
-        roll = step.mapaccum(steps).map(segments)
-        return cls(ocp, optimality, shape, steps, roll, slope.map(segments * steps), ends, starts)
+        if fast:
+            step, slope = compiled(step), compiled(slope)
+        roll = Buffered(step.mapaccum(steps).map(segments))
+        slopes = Buffered(slope.map(segments * steps))
+        return cls(ocp, optimality, shape, steps, roll, slopes, ends, starts)
 
     # -- the boundary value problem --------------------------------------------------------
 
@@ -157,8 +172,8 @@ class Extremals:
     def paths(self, z: np.ndarray, schedule: Schedule, duration: float) -> Paths:
         """Integrate every segment from its start."""
         after, costs = self.roll(z.T, *self._inputs(schedule, duration))
-        steps = np.array(after).T.reshape(self.shape.segments, self.steps, -1)
-        return Paths(np.concatenate([z[:, None, :], steps], axis=1), np.array(costs).ravel())
+        steps = after.T.reshape(self.shape.segments, self.steps, -1)
+        return Paths(np.concatenate([z[:, None, :], steps], axis=1), costs.ravel())
 
     def step_slopes(
         self, paths: Paths, schedule: Schedule, duration: float
@@ -166,7 +181,7 @@ class Extremals:
         """Return the derivative of each step in z, (S M, 2 nx, 2 nx), and in T, (S M, 2 nx)."""
         before = paths.z[:, :-1].reshape(-1, paths.z.shape[2])
         in_z, in_time = self.slopes(before.T, *self._inputs(schedule, duration))
-        return _blocks(in_z, before.shape[1]), np.array(in_time).T
+        return _blocks(in_z, before.shape[1]), in_time.T
 
     def segment_slopes(
         self, paths: Paths, schedule: Schedule, duration: float
@@ -287,14 +302,26 @@ def _end_conditions(ocp: OCP, optimality: Optimality) -> ca.Function:
     return ca.Function("ends", [z, nu, t, p], [value, *derivatives])
 
 
-def _blocks(horizontal: ca.DM, size: int) -> np.ndarray:
+def _blocks(horizontal: np.ndarray, size: int) -> np.ndarray:
     """Return CasADi's blocks side by side as (number, size, size)."""
-    return np.array(horizontal).T.reshape(-1, size, size).transpose(0, 2, 1)
+    return horizontal.T.reshape(-1, size, size).transpose(0, 2, 1)
 
 
 def _assemble(blocks: list[list], *, keep_time: bool) -> sparse.csc_matrix:
     """Stack the blocks, without columns that stand for no unknown."""
     rows = [row if keep_time else row[:-1] for row in blocks]
     used = [j for j in range(len(rows[0])) if any(r[j] is not None and r[j].shape[1] for r in rows)]
-    kept = [[None if r[j] is None else sparse.coo_matrix(r[j]) for j in used] for r in rows]
-    return sparse.csc_matrix(sparse.bmat(kept))
+    columns = dict(zip(used, np.cumsum([0, *(_width(rows, j) for j in used)]), strict=False))
+    entries, top = [], 0
+    for row in rows:
+        for j, left in columns.items():
+            if row[j] is not None:
+                i, k = np.nonzero(row[j])
+                entries.append((row[j][i, k], top + i, left + k))
+        top += next(len(block) for block in row if block is not None)
+    data, i, k = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return sparse.csc_matrix((data, (i, k)), shape=(top, sum(_width(rows, j) for j in used)))
+
+
+def _width(rows: list[list], j: int) -> int:
+    return next(row[j].shape[1] for row in rows if row[j] is not None)

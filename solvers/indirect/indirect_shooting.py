@@ -56,6 +56,7 @@ class IndirectShooting(Solver):
         continuation: what to do when Newton fails from the guess.
         tolerance: on the max norm of the boundary value problem's residual.
         max_steps: limit of Newton steps (of each problem in a continuation).
+        compiled: run the steps as machine code; the first build takes seconds, see ``compiled``.
     """
 
     segments: int = 1
@@ -67,6 +68,7 @@ class IndirectShooting(Solver):
     continuation: HorizonContinuation | ParameterContinuation | None = None
     tolerance: float = 1e-10
     max_steps: int = 50
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -91,9 +93,10 @@ class IndirectShooting(Solver):
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-self.steps // self.segments)
-        return IndirectShootingProgram(
-            self, Extremals.of(ocp, self.segments, per_segment, self.integrator)
+        extremals = Extremals.of(
+            ocp, self.segments, per_segment, self.integrator, fast=self.compiled
         )
+        return IndirectShootingProgram(self, extremals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,32 @@
+"""The command that measures MPC on the arm."""
+
+import pytest
+
+from benchmarks.arm_speed import Steps, arm, arm_steps, driver_overhead, exponent
+from benchmarks.arm_speed_tables import growth_table, overhead_line, ratio_table
+from solvers import Schuetz
+
+
+def test_ratios_are_taken_step_by_step():
+    slow = Steps("a", False, (2.0, 8.0, 4.0), 1.0)
+    fast = Steps("a", True, (1.0, 1.0, 4.0), 1.0)
+    assert fast.over(slow) == pytest.approx(0.5)
+    assert fast.median == 1.0
+    assert ratio_table([slow, fast]).row_count == 2
+
+
+def test_exponent_is_the_slope_in_the_logarithms():
+    assert exponent((10, 20, 40), (1.0, 4.0, 16.0)) == pytest.approx(2.0)
+
+
+@pytest.mark.slow
+def test_interpreted_and_compiled_steps_are_both_planned():
+    steps = arm_steps({"gradient": Schuetz.sound(intervals=8)}, arm(), 3)
+    assert [s.compiled for s in steps] == [False, True]
+    assert all(s.planned == 1.0 and len(s.times) == 3 for s in steps)
+    assert growth_table({8: steps}, "one size").row_count == 2
+
+
+def test_the_drivers_own_time_is_told():
+    line = overhead_line(driver_overhead(count=10))
+    assert "flight recorder" in line
