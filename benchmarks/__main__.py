@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench | figures | speed | greedy``."""
+"""Command line: ``python -m benchmarks list | run | bench | figures | speed | greedy | clear``."""
 
 import argparse
 import sys
@@ -11,6 +11,7 @@ from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
+from benchmarks.clear_table import clear_table
 from benchmarks.extremes import extremes_table
 from benchmarks.figures import FIGURES, chosen, draw_all
 from benchmarks.greedy_gap import greedy_table
@@ -54,6 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "greedy":
         console.print(greedy_table())
         return 0
+    if options.command == "clear":
+        for kind in ("beyond", "radius"):
+            console.print(clear_table(kind))
+        return 0
     cases = _chosen(all_cases(), options.case, "case")
     if options.suite:
         cases = [case for case in cases if case.suite == options.suite]
@@ -85,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     speed.add_argument("--horizons", nargs="+", type=_positive, default=HORIZONS, metavar="N")
     speed.add_argument("--count", type=_positive, default=20, metavar="K", help="steps measured")
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
+    commands.add_parser("clear", help="which hard clearances no motion at all can keep (3.3)")
     for command in (run, bench, figures):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser
