@@ -85,14 +85,14 @@ class Ascent:
         relaxed, stalled, retreats = self.program.relaxed, 0, 0
         there = Multipliers.zero(relaxed, self.solver.intervals, self.solver.penalty)
         while self.runs < self.solver.max_iterations:
-            here = self._round(there, guess)
+            here = self._round(there, self._scaled(there, guess))
             if not here.is_trajectory:
                 self.lost, retreats = here, retreats + 1
                 if retreats > _RETREATS:
                     return self._failed(here)
                 there = self._retreat(there)
                 continue
-            retreats, guess = 0, here.inner
+            retreats = 0
             stalled = 0 if self._improves(here) else stalled + 1
             self.rounds.append(here)
             decided = self._decided(here, stalled)
@@ -100,6 +100,13 @@ class Ascent:
                 return decided
             there = self._next(here)
         return self._infeasible_or(Status.ITERATION_LIMIT)
+
+    def _scaled(self, there: Multipliers, guess: Start | None) -> Start | None:
+        """Return where a round starts: at the last one, its costates in the scale of this one."""
+        if not self.rounds:
+            return guess
+        last = self.rounds[-1]
+        return _rescaled(last.inner, there.scale / last.used.scale)
 
     def _retreat(self, lost: Multipliers) -> Multipliers:
         """Go halfway back to the last round; before the first one, a lower penalty."""
@@ -113,7 +120,7 @@ class Ascent:
         inner = program.inner.run(x0=data.x0, t0=data.t0, parameters=given, guess=guess)
         self.work, self.runs = self.work + inner.work, self.runs + 1
         kind = "linear" if inner.control_kind == "extremal" else inner.control_kind
-        answer = inner.with_(
+        answer = _rescaled(inner, 1.0 / used.scale).with_(
             problem=program.ocp, control_kind=kind, parameters=data.values.as_dict()
         )
         verdict = evaluate(answer)
@@ -137,11 +144,15 @@ class Ascent:
         s = self.solver
         before = self.rounds[-2].violation if len(self.rounds) > 1 else np.inf
         slow = here.violation > max(_ENOUGH * before, s.tolerance)
-        penalty = min(here.used.penalty * s.growth, s.largest_penalty) if slow else None
+        grown = min(here.used.penalty * s.growth, s.largest_penalty)
+        penalty = grown if slow else here.used.penalty
         if here.used.penalty >= s.largest_penalty and here.violation > _CREEPING * before:
             # Multipliers of single instants converge slowly: aim further and further inside.
             self.aim = min(2.0 * self.aim, _FURTHEST * here.violation)
-        return here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty)
+        # The relaxed cost stays of the order of the cost: an inner solver can then meet its own
+        # tolerance while the multipliers' term is many times the cost. No gap, no scaling.
+        scale = 1.0 / (1.0 + here.gap)
+        return here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty, scale=scale)
 
     # -- the verdict -----------------------------------------------------------------------
 
@@ -216,3 +227,8 @@ class Ascent:
             },
             solve_time=seconds,
         )
+
+
+def _rescaled(solution: Solution, factor: float) -> Solution:
+    """The same motion, where the cost is multiplied by a factor."""
+    return solution.with_(costate=factor * solution.costate)
