@@ -62,7 +62,11 @@ class Round:
     @property
     def gap(self) -> float:
         """Multipliers times what is left of their constraints, relative to 1 + abs(cost)."""
-        left = self.used.weight_of(self.path, self.end, self.answer.duration)
+        return self.gap_under(self.used)
+
+    def gap_under(self, multipliers: Multipliers) -> float:
+        """The same with other multipliers than those of the run."""
+        left = multipliers.weight_of(self.path, self.end, self.answer.duration)
         return left / (1.0 + abs(self.verdict.cost))
 
 
@@ -149,10 +153,10 @@ class Ascent:
         if here.used.penalty >= s.largest_penalty and here.violation > _CREEPING * before:
             # Multipliers of single instants converge slowly: aim further and further inside.
             self.aim = min(2.0 * self.aim, _FURTHEST * here.violation)
+        there = here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty)
         # The relaxed cost stays of the order of the cost: an inner solver can then meet its own
         # tolerance while the multipliers' term is many times the cost. No gap, no scaling.
-        scale = 1.0 / (1.0 + here.gap)
-        return here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty, scale=scale)
+        return replace(there, scale=1.0 / (1.0 + here.gap_under(there)))
 
     # -- the verdict -----------------------------------------------------------------------
 

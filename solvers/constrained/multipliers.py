@@ -39,7 +39,7 @@ class Multipliers:
         return given | ({END_MULTIPLIER: self.end} if self.end.size else {})
 
     def updated(
-        self, path: np.ndarray, end: np.ndarray, *, aim: float, penalty: float, scale: float
+        self, path: np.ndarray, end: np.ndarray, *, aim: float, penalty: float
     ) -> "Multipliers":
         """Return the multipliers of first order for these values of the rows.
 
@@ -48,14 +48,12 @@ class Multipliers:
             end: (k,).
             aim: how far inside an inequality should end.
             penalty: the next one.
-            scale: the next one.
         """
         return replace(
             self,
             path=self._pushed(self.path, path, self.relaxed.path.is_equation, aim),
             end=self._pushed(self.end, end, self.relaxed.end.is_equation, aim),
             penalty=penalty,
-            scale=scale,
         )
 
     def halfway(self, other: "Multipliers") -> "Multipliers":

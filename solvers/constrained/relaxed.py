@@ -22,10 +22,11 @@ class Relaxed:
         + \int L + P\bigl(c(x, u, t), \mu(t), \rho\bigr) \, dt \Bigr), \qquad
         P(c, \mu, \rho) = \sum_i \frac{\max(0, \mu_i + \rho c_i)^2 - \mu_i^2}{2 \rho}
 
-    and for an equation μ c + ρ c²/2. The scale σ changes no minimiser, but what the tolerances
-    of a solver mean: without it they are out of reach where P outgrows the cost. Path constraints, state bounds and terminal constraints
+    and for an equation μ c + ρ c²/2. Path constraints, state bounds and terminal constraints
     are relaxed; control bounds, initial constraints and a free final time stay. P is once
-    continuously differentiable in c, so the problem is no smoother than that.
+    continuously differentiable in c, so the problem is no smoother than that. The scale σ
+    changes no minimiser, but what the tolerances of a solver mean: where P outgrows the cost
+    they would be out of reach without it.
 
     Source: [Hestenes 1969], [Rockafellar 1974], [Hager 1990].
 
