@@ -22,7 +22,8 @@ _TRAJECTORY = 1e-2
 # A violation that a round leaves this much of creeps; how far inside, in multiples of it, one
 # may then aim. What that costs is part of the gap.
 _CREEPING, _FURTHEST = 0.75, 3.0
-# Multipliers whose term is of the order of the cost push against something that does not yield.
+# At a solution the multipliers' term vanishes. Where it stays above this share of the cost, and
+# the violation too, the multipliers grow against something that does not yield.
 _OUTGROWN = 0.1
 
 
