@@ -1,4 +1,4 @@
-"""``python -m benchmarks list | run | bench | figures | speed | arm-speed | greedy``."""
+"""Command line: ``python -m benchmarks``; with ``--help`` it says what it can do."""
 
 import argparse
 import sys
@@ -13,6 +13,7 @@ from benchmarks.arm_speed import INTERVALS, LINKS
 from benchmarks.arm_speed_tables import print_arm_speed
 from benchmarks.cases import Case, all_cases
 from benchmarks.claims import below_reference, claims_of
+from benchmarks.clear_table import clear_table
 from benchmarks.comparison import SUITE as COMPARISON
 from benchmarks.comparison import comparison_claims, comparison_table
 from benchmarks.extremes import extremes_table
@@ -61,6 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "greedy":
         console.print(greedy_table())
         return 0
+    if options.command == "clear":
+        for kind in ("beyond", "radius"):
+            console.print(clear_table(kind))
+        return 0
     cases = _chosen(all_cases(), options.case, "case")
     if options.suite:
         cases = [case for case in cases if case.suite == options.suite]
@@ -96,6 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     arm.add_argument("--links", nargs="*", type=_positive, default=LINKS, metavar="n")
     arm.add_argument("--count", type=_positive, default=40, metavar="K", help="steps measured")
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
+    commands.add_parser("clear", help="which hard clearances no motion at all can keep (3.3)")
     for command in (run, bench, figures):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser

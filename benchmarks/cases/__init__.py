@@ -2,7 +2,13 @@
 
 from benchmarks.cases.arm import arm_cases, arm_parts, arm_scenario, comparison_cases
 from benchmarks.cases.case import Case, Family
-from benchmarks.cases.clearance import clearance_cases, required_clearance, soft_optimum
+from benchmarks.cases.clearance import (
+    Kind,
+    clearance_cases,
+    required_clearance,
+    required_names,
+    soft_optimum,
+)
 from benchmarks.cases.links import link_cases
 from benchmarks.cases.textbook import TEXTBOOK
 
@@ -22,6 +28,7 @@ __all__ = [
     "TEXTBOOK",
     "Case",
     "Family",
+    "Kind",
     "all_cases",
     "arm_cases",
     "arm_parts",
@@ -30,5 +37,6 @@ __all__ = [
     "comparison_cases",
     "link_cases",
     "required_clearance",
+    "required_names",
     "soft_optimum",
 ]

@@ -20,6 +20,11 @@ def _required() -> dict[str, float]:
     return json.loads(text)
 
 
+def required_names() -> tuple[str, ...]:
+    """Return the names of the scenarios."""
+    return tuple(_required())
+
+
 def required_clearance(name: str, kind: Kind) -> float:
     """Return the distance from the disc's centre that every link has to keep [m].
 

@@ -22,6 +22,7 @@ from benchmarks.figures import (
     over_links,
     predictive,
     regulation,
+    together,
 )
 from benchmarks.figures.drawing import Drawing, write
 
@@ -70,6 +71,7 @@ FIGURES = (
     Figure("3.13a", "what makes it climb", descent.causes),
     Figure("3.13b", "its gap over the step length", descent_gap.over_step),
     Figure("3.13c", "its gap over the start", descent_gap.over_start),
+    Figure("3.14", "three kinds of control side by side", together.together),
     Figure("3.15", "cost of all methods over the horizon", over_horizon.costs),
     Figure("3.16", "the cost function dilemma", dilemma.costs),
     Figure("basin", "the basins of single shooting", basin.basins),

@@ -22,7 +22,8 @@ _TRAJECTORY = 1e-2
 # A violation that a round leaves this much of creeps; how far inside, in multiples of it, one
 # may then aim. What that costs is part of the gap.
 _CREEPING, _FURTHEST = 0.75, 3.0
-# Multipliers whose term is of the order of the cost push against something that does not yield.
+# At a solution the multipliers' term vanishes. Where it stays above this share of the cost, and
+# the violation too, the multipliers grow against something that does not yield.
 _OUTGROWN = 0.1
 
 
@@ -62,7 +63,11 @@ class Round:
     @property
     def gap(self) -> float:
         """Multipliers times what is left of their constraints, relative to 1 + abs(cost)."""
-        left = self.used.weight_of(self.path, self.end, self.answer.duration)
+        return self.gap_under(self.used)
+
+    def gap_under(self, multipliers: Multipliers) -> float:
+        """The same with other multipliers than those of the run."""
+        left = multipliers.weight_of(self.path, self.end, self.answer.duration)
         return left / (1.0 + abs(self.verdict.cost))
 
 
@@ -85,14 +90,14 @@ class Ascent:
         relaxed, stalled, retreats = self.program.relaxed, 0, 0
         there = Multipliers.zero(relaxed, self.solver.intervals, self.solver.penalty)
         while self.runs < self.solver.max_iterations:
-            here = self._round(there, guess)
+            here = self._round(there, self._scaled(there, guess))
             if not here.is_trajectory:
                 self.lost, retreats = here, retreats + 1
                 if retreats > _RETREATS:
                     return self._failed(here)
                 there = self._retreat(there)
                 continue
-            retreats, guess = 0, here.inner
+            retreats = 0
             stalled = 0 if self._improves(here) else stalled + 1
             self.rounds.append(here)
             decided = self._decided(here, stalled)
@@ -100,6 +105,13 @@ class Ascent:
                 return decided
             there = self._next(here)
         return self._infeasible_or(Status.ITERATION_LIMIT)
+
+    def _scaled(self, there: Multipliers, guess: Start | None) -> Start | None:
+        """Return where a round starts: at the last one, its costates in the scale of this one."""
+        if not self.rounds:
+            return guess
+        last = self.rounds[-1]
+        return _rescaled(last.inner, there.scale / last.used.scale)
 
     def _retreat(self, lost: Multipliers) -> Multipliers:
         """Go halfway back to the last round; before the first one, a lower penalty."""
@@ -113,7 +125,7 @@ class Ascent:
         inner = program.inner.run(x0=data.x0, t0=data.t0, parameters=given, guess=guess)
         self.work, self.runs = self.work + inner.work, self.runs + 1
         kind = "linear" if inner.control_kind == "extremal" else inner.control_kind
-        answer = inner.with_(
+        answer = _rescaled(inner, 1.0 / used.scale).with_(
             problem=program.ocp, control_kind=kind, parameters=data.values.as_dict()
         )
         verdict = evaluate(answer)
@@ -137,11 +149,15 @@ class Ascent:
         s = self.solver
         before = self.rounds[-2].violation if len(self.rounds) > 1 else np.inf
         slow = here.violation > max(_ENOUGH * before, s.tolerance)
-        penalty = min(here.used.penalty * s.growth, s.largest_penalty) if slow else None
+        grown = min(here.used.penalty * s.growth, s.largest_penalty)
+        penalty = grown if slow else here.used.penalty
         if here.used.penalty >= s.largest_penalty and here.violation > _CREEPING * before:
             # Multipliers of single instants converge slowly: aim further and further inside.
             self.aim = min(2.0 * self.aim, _FURTHEST * here.violation)
-        return here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty)
+        there = here.used.updated(here.path, here.end, aim=self.aim, penalty=penalty)
+        # The relaxed cost stays of the order of the cost: an inner solver can then meet its own
+        # tolerance while the multipliers' term is many times the cost. No gap, no scaling.
+        return replace(there, scale=1.0 / (1.0 + here.gap_under(there)))
 
     # -- the verdict -----------------------------------------------------------------------
 
@@ -216,3 +232,8 @@ class Ascent:
             },
             solve_time=seconds,
         )
+
+
+def _rescaled(solution: Solution, factor: float) -> Solution:
+    """The same motion, where the cost is multiplied by a factor."""
+    return solution.with_(costate=factor * solution.costate)

@@ -42,8 +42,9 @@ class AugmentedLagrangian(Solver):
     problem has none left; initial constraints, control bounds and a free final time stay with
     the inner solver, which may refuse them. It succeeds when the referee's violation is within
     the tolerance, the complementarity is small and the inner solver stands behind its last
-    run; it is ``INFEASIBLE`` when the start itself violates a constraint, or when the largest
-    penalty no longer reduces the violation (a local verdict).
+    run; it is ``INFEASIBLE`` when the start itself violates a constraint, or, a local verdict,
+    when a violation stays although the multipliers' term has outgrown the cost, and the inner
+    solver stands behind most of its runs.
 
     The multipliers are in ``history``: ``"multiplier"`` (N + 1, m) per second, at the nodes,
     and ``"terminal multiplier"``; per round ``"violation"``, ``"complementarity"``,

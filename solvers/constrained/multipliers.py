@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.constrained.relaxed import END_MULTIPLIER, MULTIPLIER, PENALTY, Relaxed
+from solvers.constrained.relaxed import END_MULTIPLIER, MULTIPLIER, PENALTY, SCALE, Relaxed
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,12 +17,14 @@ class Multipliers:
         path: at the nodes, per second, (N + 1, m).
         end: of the terminal rows, (k,).
         penalty: rho.
+        scale: sigma, of the whole relaxed cost.
     """
 
     relaxed: Relaxed
     path: np.ndarray
     end: np.ndarray
     penalty: float
+    scale: float = 1.0
 
     @classmethod
     def zero(cls, relaxed: Relaxed, intervals: int, penalty: float) -> "Multipliers":
@@ -32,12 +34,12 @@ class Multipliers:
 
     def parameters(self) -> dict[str, ArrayLike]:
         """Return the values that the relaxed problem takes at run time."""
-        given: dict[str, ArrayLike] = {PENALTY: self.penalty}
+        given: dict[str, ArrayLike] = {PENALTY: self.penalty, SCALE: self.scale}
         given |= {MULTIPLIER: self.path} if self.path.size else {}
         return given | ({END_MULTIPLIER: self.end} if self.end.size else {})
 
     def updated(
-        self, path: np.ndarray, end: np.ndarray, *, aim: float, penalty: float | None
+        self, path: np.ndarray, end: np.ndarray, *, aim: float, penalty: float
     ) -> "Multipliers":
         """Return the multipliers of first order for these values of the rows.
 
@@ -45,22 +47,23 @@ class Multipliers:
             path: (N + 1, m).
             end: (k,).
             aim: how far inside an inequality should end.
-            penalty: the next one; None: the same.
+            penalty: the next one.
         """
         return replace(
             self,
             path=self._pushed(self.path, path, self.relaxed.path.is_equation, aim),
             end=self._pushed(self.end, end, self.relaxed.end.is_equation, aim),
-            penalty=penalty or self.penalty,
+            penalty=penalty,
         )
 
     def halfway(self, other: "Multipliers") -> "Multipliers":
-        """Return what lies in the middle; of the penalties the geometric mean."""
+        """Return what lies in the middle; of penalties and scales the geometric mean."""
         return replace(
             self,
             path=(self.path + other.path) / 2,
             end=(self.end + other.end) / 2,
             penalty=float(np.sqrt(self.penalty * other.penalty)),
+            scale=float(np.sqrt(self.scale * other.scale)),
         )
 
     def weight_of(self, path: np.ndarray, end: np.ndarray, duration: float) -> float:

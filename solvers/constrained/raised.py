@@ -54,7 +54,7 @@ def raise_until_clear(
         the solver's own failure where it failed.
 
     Raises:
-        ProblemError: if the problems do not fit, or the parameter is none.
+        ProblemError: if the problems do not fit, or the parameter is none or not positive.
     """
     instance(solver, Solver, "raise until clear: solver")
     whole(most, "raise until clear: most")
@@ -63,7 +63,13 @@ def raise_until_clear(
         raise ProblemError(f"{soft.name} has no parameter '{parameter}'")
     if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
         raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
-    program, price = solver.build(soft), known[parameter].value
+    price = np.asarray(known[parameter].value, dtype=float)
+    if not (tolerance > 0.0 and (price > 0.0).all()):
+        raise ProblemError(
+            f"raise until clear: tolerance = {tolerance} and '{parameter}' = {price} must be "
+            "positive, or nothing can be raised until anything is clear"
+        )
+    program = solver.build(soft)
     runs: list[Solution] = []
     violations: list[float] = []
     worst = ""
@@ -74,7 +80,7 @@ def raise_until_clear(
         worst = verdict.worst
         if not run.status.is_success or verdict.violation <= tolerance:
             break
-        price = factor * np.asarray(price)
+        price = factor * price
     last, status, message = runs[-1], runs[-1].status, runs[-1].message
     if status.is_success and violations[-1] > tolerance:
         status = Status.INFEASIBLE

@@ -9,7 +9,7 @@ from ocp import OCP, Box, Parameter, Signal
 from solvers.constrained.rows import Rows
 
 MULTIPLIER, END_MULTIPLIER = "multiplier of the path", "multiplier of the end"
-PENALTY = "penalty"
+PENALTY, SCALE = "penalty", "scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,18 +18,20 @@ class Relaxed:
 
     .. math::
 
-        \min \; \varphi + P(\psi, \nu, \rho)
-        + \int L + P\bigl(c(x, u, t), \mu(t), \rho\bigr) \, dt, \qquad
+        \min \; \sigma \Bigl( \varphi + P(\psi, \nu, \rho)
+        + \int L + P\bigl(c(x, u, t), \mu(t), \rho\bigr) \, dt \Bigr), \qquad
         P(c, \mu, \rho) = \sum_i \frac{\max(0, \mu_i + \rho c_i)^2 - \mu_i^2}{2 \rho}
 
     and for an equation μ c + ρ c²/2. Path constraints, state bounds and terminal constraints
     are relaxed; control bounds, initial constraints and a free final time stay. P is once
-    continuously differentiable in c, so the problem is no smoother than that.
+    continuously differentiable in c, so the problem is no smoother than that. The scale σ
+    changes no minimiser, but what the tolerances of a solver mean: where P outgrows the cost
+    they would be out of reach without it.
 
     Source: [Hestenes 1969], [Rockafellar 1974], [Hager 1990].
 
     Attributes:
-        ocp: the relaxed problem, with μ (a signal, linear between its samples), ν and ρ as
+        ocp: the relaxed problem, with μ (a signal, linear between its samples), ν, ρ and σ as
             parameters: it is built once and run with many of them.
         path: the rows along the way.
         end: the rows at the end, with those along the way that no control decides.
@@ -44,9 +46,12 @@ class Relaxed:
         """Relax a problem, its multipliers sampled at the ends of ``intervals``."""
         path, end = Rows.along(ocp), Rows.at_end(ocp)
         mu, nu = ca.SX.sym("mu", path.size), ca.SX.sym("nu", end.size)
-        rho = ca.SX.sym("rho")
+        rho, sigma = ca.SX.sym("rho"), ca.SX.sym("sigma")
         hold = "held" if ocp.model.is_discrete else "linear"
-        added: list[Parameter | Signal] = [Parameter(PENALTY, rho, 1.0)]
+        added: list[Parameter | Signal] = [
+            Parameter(PENALTY, rho, 1.0),
+            Parameter(SCALE, sigma, 1.0),
+        ]
         if path.size:
             added += [Signal(MULTIPLIER, mu, np.zeros((intervals + 1, path.size)), hold=hold)]
         if end.size:
@@ -54,8 +59,8 @@ class Relaxed:
         relaxed = replace(
             ocp,
             name=f"{ocp.name}, constraints relaxed",
-            running_cost=ocp.running_cost + _augmented(path, mu, rho),
-            terminal_cost=ocp.terminal_cost + _augmented(end, nu, rho),
+            running_cost=sigma * (ocp.running_cost + _augmented(path, mu, rho)),
+            terminal_cost=sigma * (ocp.terminal_cost + _augmented(end, nu, rho)),
             state_bounds=Box(),
             constraints=ocp.at("initial"),
             parameters=(*ocp.parameters, *added),

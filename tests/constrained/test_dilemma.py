@@ -66,3 +66,14 @@ def test_what_is_refused() -> None:
             raise_until_clear(soft, HARD, Schuetz.sound(), **options)  # pyright: ignore
     with pytest.raises(ProblemError):
         BarrierCost(0.0, 0.5)
+
+
+def test_a_price_that_cannot_be_raised_is_refused() -> None:
+    scenario = arm_scenario("arm-001")
+    soft, hard = bounded_ocp(scenario, weight=0.0), scenario.ocp(clearance=scenario.radius)
+    with pytest.raises(ProblemError, match="must be positive"):
+        raise_until_clear(soft, hard, MultipleShooting(20), parameter="weight")
+    with pytest.raises(ProblemError, match="must be positive"):
+        raise_until_clear(
+            bounded_ocp(scenario), hard, MultipleShooting(20), parameter="weight", tolerance=0.0
+        )
