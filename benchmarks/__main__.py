@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench | figures | speed | greedy``."""
+"""Command line: ``python -m benchmarks list | run | bench | figures | mpc | faults | speed | greedy``."""
 
 import argparse
 import sys
@@ -17,6 +17,9 @@ from benchmarks.greedy_gap import greedy_table
 from benchmarks.jacobians import jacobian_table
 from benchmarks.linear_speed import HORIZONS
 from benchmarks.methods import Method, Settings, all_methods
+from benchmarks.mpc.arm_loop import SOLVERS
+from benchmarks.mpc.commands import print_faults, print_loops
+from benchmarks.mpc.dial import COMPARED, SCENARIOS
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
 from benchmarks.speed_tables import print_speed
@@ -50,6 +53,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "speed":
         print_speed(console, options.horizons, options.count)
         return 0
+    if options.command == "mpc":
+        return print_loops(console, options.out, options.scenarios, options.controllers)
+    if options.command == "faults":
+        return print_faults(console, options.steps, options.seed)
     if options.command == "greedy":
         console.print(greedy_table())
         return 0
@@ -83,8 +90,14 @@ def _parser() -> argparse.ArgumentParser:
     speed = commands.add_parser("speed", help="linear control: a step over N, and beside qpmpc")
     speed.add_argument("--horizons", nargs="+", type=_positive, default=HORIZONS, metavar="N")
     speed.add_argument("--count", type=_positive, default=20, metavar="K", help="steps measured")
+    faults = commands.add_parser("faults", help="closed loops in which everything fails")
+    faults.add_argument("--steps", type=_positive, default=2000, metavar="K")
+    faults.add_argument("--seed", type=int, default=0)
+    loops = commands.add_parser("mpc", help="closed loops over the horizon, and other plants")
+    loops.add_argument("--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ...")
+    loops.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
-    for command in (run, bench, figures):
+    for command in (run, bench, figures, loops):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser
 
