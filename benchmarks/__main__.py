@@ -1,4 +1,4 @@
-"""Command line: ``python -m benchmarks list | run | bench | figures | mpc | faults | speed | greedy``."""
+"""Command line: ``python -m benchmarks list | run | bench | figures | mpc | faults | ...``."""
 
 import argparse
 import sys

@@ -1,5 +1,6 @@
 """The fault campaign at 2,000 steps; ``python -m benchmarks faults`` runs more."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ def test_a_schedule_is_seeded_and_leaves_calm_between_faults() -> None:
     faults = schedule(2000, 3)
     assert faults == schedule(2000, 3) != schedule(2000, 4)
     assert {fault.kind for fault in faults} == set(KINDS)
-    gaps = [after.first - before.last for before, after in zip(faults, faults[1:], strict=False)]
+    gaps = [after.first - before.last for before, after in pairwise(faults)]
     assert min(gaps) > 10
     assert active(faults, 0.1 * faults[0].last, 0.1) == faults[0]
     assert active(faults, 0.1 * (faults[0].last + 1), 0.1) is None
