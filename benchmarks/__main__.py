@@ -18,7 +18,7 @@ from benchmarks.jacobians import jacobian_table
 from benchmarks.linear_speed import HORIZONS
 from benchmarks.methods import Method, Settings, all_methods
 from benchmarks.mpc.arm_loop import SOLVERS
-from benchmarks.mpc.commands import print_faults, print_loops
+from benchmarks.mpc.commands import print_endings, print_faults, print_loops
 from benchmarks.mpc.dial import COMPARED, SCENARIOS
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "speed":
         print_speed(console, options.horizons, options.count)
         return 0
+    if options.command == "mpc" and options.short:
+        return print_endings(console)
     if options.command == "mpc":
         return print_loops(console, options.out, options.scenarios, options.controllers)
     if options.command == "faults":
@@ -96,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     loops = commands.add_parser("mpc", help="closed loops over the horizon, and other plants")
     loops.add_argument("--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ...")
     loops.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
+    loops.add_argument("--short", action="store_true", help="terminal costs, delay, the mass")
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
     for command in (run, bench, figures, loops):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")

@@ -110,8 +110,8 @@ def running_costs() -> Drawing:
         columns,
         f"Fig. 3.18: the longer the horizon, the closer the running cost to the finite horizon's, "
         f"which begins at {rates[0]:.0f} and is {np.interp(_LATE, best.t[:-1], rates):.1f} after "
-        f"{_LATE:g} s. A horizon of {_SHORT:g} s saves at first ({first[short]:.0f}) and pays later "
-        f"({then[short]:.1f}); instantaneous control jumps aside at once "
+        f"{_LATE:g} s. A horizon of {_SHORT:g} s saves at first ({first[short]:.0f}) and pays "
+        f"later ({then[short]:.1f}); instantaneous control jumps aside at once "
         f"({first[INSTANTANEOUS]:.0f}, later {then[INSTANTANEOUS]:.1f}). {_CHOSEN}; MPC around "
         f"shooting.",
     )

@@ -25,8 +25,8 @@ def finite() -> Drawing:
         columns,
         f"Fig. 2.5: finite-horizon control computes all inputs at the beginning and feeds them "
         f"forward: it is off the reference by up to {worst[0]:.2f} m, and by {worst[1]:.2f} m "
-        f"under a load of {LOAD:g} N that it never learns of. Chosen here: the mass of 2.92 (unstable), "
-        f"{1e3 * DT:g} ms.",
+        f"under a load of {LOAD:g} N that it never learns of. Chosen here: the mass of 2.92 "
+        f"(unstable), {1e3 * DT:g} ms.",
     )
 
 
