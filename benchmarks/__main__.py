@@ -23,6 +23,9 @@ from benchmarks.jacobians import jacobian_table
 from benchmarks.linear_speed import HORIZONS
 from benchmarks.method import Method, Settings
 from benchmarks.methods import all_methods
+from benchmarks.mpc.arm_loop import SOLVERS
+from benchmarks.mpc.commands import print_endings, print_faults, print_loops
+from benchmarks.mpc.dial import COMPARED, SCENARIOS
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS, Row
 from benchmarks.speed_tables import print_speed
@@ -59,6 +62,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "arm-speed":
         print_arm_speed(console, options.intervals, options.links, options.count)
         return 0
+    if options.command == "mpc" and options.short:
+        return print_endings(console)
+    if options.command == "mpc":
+        return print_loops(console, options.out, options.scenarios, options.controllers)
+    if options.command == "faults":
+        return print_faults(console, options.steps, options.seed)
     if options.command == "greedy":
         console.print(greedy_table())
         return 0
@@ -102,7 +111,14 @@ def _parser() -> argparse.ArgumentParser:
     arm.add_argument("--count", type=_positive, default=40, metavar="K", help="steps measured")
     commands.add_parser("greedy", help="what it costs to look one step ahead only (1.4)")
     commands.add_parser("clear", help="which hard clearances no motion at all can keep (3.3)")
-    for command in (run, bench, figures):
+    faults = commands.add_parser("faults", help="closed loops in which everything fails")
+    faults.add_argument("--steps", type=_positive, default=2000, metavar="K")
+    faults.add_argument("--seed", type=int, default=0)
+    loops = commands.add_parser("mpc", help="closed loops over the horizon, and other plants")
+    loops.add_argument("--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ...")
+    loops.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
+    loops.add_argument("--short", action="store_true", help="terminal costs, delay, the mass")
+    for command in (run, bench, figures, loops):
         command.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser
 

@@ -107,7 +107,7 @@ def _sentence(columns: dict[str, np.ndarray]) -> str:
 
     solved = int(np.isfinite(columns[f"gap, {INDIRECT} [%]"]).sum())
     return (
-        f"Links: of {len(numbers)} random arms direct multiple shooting from its own start comes "
+        f"Fig. links: of {len(numbers)} random arms direct multiple shooting from its own start comes "
         f"within 1 % of the best known cost on {best(DIRECT)}, Schuetz with a line search on "
         f"{best(SCHUETZ)}, indirect multiple shooting from the direct answer on {best(INDIRECT)} "
         f"(it solves {solved}). From {numbers.min()} to {numbers.max()} links the time grows by "

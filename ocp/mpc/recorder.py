@@ -1,7 +1,7 @@
 """The flight recorder: every step on disk as it happens, and any of them played again."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -155,23 +155,35 @@ def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
     Raises:
         ProblemError: if the file is not of this problem and solver, or ends before the step.
     """
+    return next(replay_all(mpc, path, [step]))
+
+
+def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Replay]:
+    """Decide several recorded steps again, and yield them in their order; see ``replay``.
+
+    Raises:
+        ProblemError: if the file is not of this problem and solver, or ends before a step.
+    """
     with Path(path).open("rb") as file:
         header = _header(file, path)
     for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
         if header[name] != own:
             raise ProblemError(f"{path} records the {name} '{header[name]}', not '{own}'")
-    known = _Known()
-    again = replace(mpc, parameters=known)
-    memory, found = Memory(), None
+    wanted, known = set(steps), _Known()
+    again, memory = replace(mpc, parameters=known), Memory()
     for k, record in enumerate(records(path)):
-        if k == step or again.remembers:
+        if not wanted:
+            return
+        # What a solver remembers comes from all the steps before.
+        if k in wanted or again.remembers:
             again.memory, known.record = memory, record
             found = Replay(record, _again(again, record))
-        if k == step:
-            assert found is not None
-            return found
+            if k in wanted:
+                wanted.remove(k)
+                yield found
         memory = memory.after(record.input, _plan(mpc, record), mpc.steps_late)
-    raise ProblemError(f"{path} has no step {step}")
+    if wanted:
+        raise ProblemError(f"{path} has no step {min(wanted)}")
 
 
 def _header(file: BinaryIO, path: str | Path) -> dict[str, str]:

@@ -102,7 +102,7 @@ def _sweep(extremals: Extremals, final: ca.Function) -> ca.Function:
     z, _ = final(end, t1, first)
     shares = [fractions[:-1], fractions[1:] - fractions[:-1]]
     constant = [ca.repmat(duration, 1, steps), ca.repmat(t1, 1, steps)]
-    after, costs = extremals.roll(z, *constant, *shares, left, right)
+    after, costs = extremals.roll.function(z, *constant, *shares, left, right)
     start = after[:, -1]
     # Backwards in time every running cost comes out negative.
     cost = ocp.functions.terminal_cost(end, t1, first) - ca.sum2(costs)

@@ -1,0 +1,1 @@
+"""Closed loops compared: the arm over the horizon, faults, delay, other plants."""

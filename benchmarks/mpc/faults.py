@@ -1,0 +1,121 @@
+"""The fault campaign: whatever fails, every input is one that may be sent to a robot."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.mpc.fault_problems import Subject, arm, cart
+from benchmarks.mpc.faulty import NEVER_OPTIMAL, Hindered, Schedule, active, schedule
+from ocp import FlightRecorder, Outcome, Rollout, closed_loop, replay_all
+
+SUBJECTS: Mapping[str, Callable[[Schedule], Subject]] = {"cart": cart, "arm": arm}
+# Steps in one loop and one flight record.
+PIECE = 500
+# Steps after a fault within which a decision is optimal again.
+RECOVERY = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What a campaign on one subject found; all but the counts should be zero.
+
+    Attributes:
+        subject: cart or arm.
+        steps: in all.
+        faults: faults by kind.
+        outcomes: decisions by kind of fault ("none" between them) and rung.
+        bad_inputs: that are not finite or leave their bounds.
+        unnamed: steps that are not optimal and do not say why.
+        lies: steps called optimal although they cannot be.
+        slow: faults after which no decision was optimal within ``RECOVERY`` calm steps.
+        refused: loops that ended early.
+        replayed: failures that were decided again from the flight record.
+        differing: those that came out otherwise, in any bit.
+    """
+
+    subject: str
+    steps: int
+    faults: Counter[str]
+    outcomes: Counter[tuple[str, Outcome]]
+    bad_inputs: int
+    unnamed: int
+    lies: int
+    slow: int
+    refused: int
+    replayed: int
+    differing: int
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing was found."""
+        found = (self.bad_inputs, self.unnamed, self.lies, self.slow, self.refused, self.differing)
+        return not any(found)
+
+    def __add__(self, other: "Report") -> "Report":
+        """Return both as one."""
+        mine, yours = vars(self), vars(other)
+        return Report(
+            subject=self.subject,
+            **{name: mine[name] + yours[name] for name in mine if name != "subject"},
+        )
+
+
+def campaign(subject: str, steps: int, *, seed: int = 0) -> Report:
+    """Run the loop for a number of steps, in pieces with their own random numbers."""
+    pieces = [min(PIECE, steps - first) for first in range(0, steps, PIECE)]
+    total = _piece(subject, pieces[0], seed)
+    for k, count in enumerate(pieces[1:], start=1):
+        total += _piece(subject, count, seed + k)
+    return total
+
+
+def _piece(name: str, steps: int, seed: int) -> Report:
+    faults = schedule(steps, seed)
+    subject = SUBJECTS[name](faults)
+    mpc, hindered = subject.mpc, Hindered(subject.mpc, faults)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "flight"
+        with FlightRecorder(mpc, file) as recorder:
+            rollout = closed_loop(
+                hindered, subject.plant, subject.x0, steps * mpc.dt,
+                dt=mpc.dt, seed=seed, sensors=hindered.sensors, watch=recorder.watch,
+            )  # fmt: skip
+        failed = [k for k, o in enumerate(rollout.outcomes) if o is not Outcome.OPTIMAL]
+        again = [replayed.is_exact for replayed in replay_all(mpc, file, failed)]
+    return _judged(name, subject, faults, rollout, again)
+
+
+def _judged(
+    name: str, subject: Subject, faults: Schedule, rollout: Rollout, again: list[bool]
+) -> Report:
+    box = subject.mpc.applied.box(subject.mpc.ocp)
+    dt, decisions = subject.mpc.dt, rollout.decisions
+    inputs = np.array([d.input for d in decisions])
+    at = [active(faults, d.t, dt) for d in decisions]
+    kinds = [fault.kind if fault else "none" for fault in at]
+    return Report(
+        subject=name,
+        steps=len(decisions),
+        faults=Counter(fault.kind for fault in faults),
+        outcomes=Counter((kind, d.outcome) for kind, d in zip(kinds, decisions, strict=True)),
+        bad_inputs=int((~np.isfinite(inputs) | (box.excess(inputs) > 0.0)).any(axis=1).sum()),
+        unnamed=sum(d.outcome is not Outcome.OPTIMAL and not d.message for d in decisions),
+        lies=sum(
+            kind in NEVER_OPTIMAL and d.outcome is Outcome.OPTIMAL
+            for kind, d in zip(kinds, decisions, strict=True)
+        ),
+        slow=sum(_is_slow(rollout, fault.last + 1) for fault in faults),
+        refused=int(bool(rollout.ended)),
+        replayed=len(again),
+        differing=again.count(False),
+    )
+
+
+def _is_slow(rollout: Rollout, first: int) -> bool:
+    """Whether none of the calm steps after a fault is optimal."""
+    after = rollout.outcomes[first : first + RECOVERY]
+    return len(after) == RECOVERY and Outcome.OPTIMAL not in after

@@ -1,0 +1,149 @@
+"""Things that fail on a schedule: a solver, a sensor, a computer that is too slow."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import MPC, OCP, Decision, Program, Solution, Solver, Start, Status
+
+# What happens inside the solver, or to its answer.
+IN_SOLVER = ("exception", "no convergence", "iteration limit", "nan answer", "out of bounds")
+# What the controller is told.
+IN_SENSOR = ("nan measurement", "jumped measurement")
+# What it is asked for, or meets.
+OUTSIDE = ("late answer", "infeasible target", "obstacle", "mismatch")
+KINDS = (*IN_SOLVER, *IN_SENSOR, *OUTSIDE)
+# No decision may be called optimal while one of these lasts.
+NEVER_OPTIMAL = frozenset({*IN_SOLVER, "nan measurement", "late answer"})
+_CALM, _LENGTH = (15, 30), (1, 8)  # steps
+
+
+class Fault(NamedTuple):
+    """A fault that lasts for some steps.
+
+    Attributes:
+        kind: of ``KINDS``.
+        first: step.
+        last: step, included.
+        size: in [-1, 1], how bad it is, where that can be said.
+    """
+
+    kind: str
+    first: int
+    last: int
+    size: float
+
+
+Schedule = tuple[Fault, ...]
+
+
+def schedule(steps: int, seed: int) -> Schedule:
+    """Return faults one after the other, each kind as often as any, calm steps in between."""
+    rng = np.random.default_rng(seed)
+    faults, at, kinds = [], 0, []
+    while True:
+        kinds = kinds or [str(kind) for kind in rng.permutation(KINDS)]
+        first = at + int(rng.integers(*_CALM, endpoint=True))
+        at = first + int(rng.integers(*_LENGTH, endpoint=True))
+        if at >= steps:
+            return tuple(faults)
+        faults.append(Fault(kinds.pop(), first, at - 1, float(rng.uniform(-1.0, 1.0))))
+
+
+def active(faults: Schedule, t: float, dt: float) -> Fault | None:
+    """Return the fault at an instant [s]."""
+    k = round(t / dt)
+    return next((fault for fault in faults if fault.first <= k <= fault.last), None)
+
+
+@dataclass(frozen=True)
+class Faulty(Solver):
+    """A good solver that fails on a schedule.
+
+    Args:
+        inner: the good one.
+        dt: sampling interval of the loop [s].
+        faults: only those of ``IN_SOLVER`` matter here.
+    """
+
+    inner: Solver
+    dt: float
+    faults: Schedule = ()
+
+    def build(self, ocp: OCP) -> "FaultyProgram":
+        """Build the good one."""
+        return FaultyProgram(self, self.inner.build(ocp))
+
+
+@dataclass(frozen=True, eq=False)
+class FaultyProgram(Program):
+    """The compiled form."""
+
+    solver: Faulty
+    inner: Program
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve, and then spoil it if it is time."""
+        solution = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        fault = active(self.solver.faults, t0, self.solver.dt)
+        return _spoilt(solution, fault) if fault else solution
+
+
+def _spoilt(solution: Solution, fault: Fault) -> Solution:
+    said = f"on schedule: {fault.kind}"
+    match fault.kind:
+        case "exception":
+            raise RuntimeError(said)
+        case "no convergence":
+            return solution.with_(status=Status.DIVERGED, message=said)
+        case "iteration limit":
+            u = (1.0 + 0.5 * fault.size) * solution.u
+            return solution.with_(u=u, status=Status.ITERATION_LIMIT, message=said)
+        case "nan answer":
+            return solution.with_(u=np.full_like(solution.u, np.nan))
+        case "out of bounds":
+            return solution.with_(u=solution.u + np.copysign(1e3, fault.size))
+    return solution
+
+
+@dataclass(frozen=True, eq=False)
+class Hindered:
+    """An ``MPC`` whose answers come too late on a schedule, rather than by the clock."""
+
+    mpc: MPC
+    faults: Schedule = field(default=())
+
+    @property
+    def delay(self) -> float:
+        """Of the MPC [s]."""
+        return self.mpc.delay
+
+    def reset(self) -> None:
+        """Reset the MPC."""
+        self.mpc.reset()
+
+    def step(self, x: np.ndarray, t: float) -> Decision:
+        """Decide, late or not."""
+        fault = active(self.faults, t, self.mpc.dt)
+        return self.mpc.step(x, t, late=fault is not None and fault.kind == "late answer")
+
+    def sensors(self, x: np.ndarray, t: float) -> np.ndarray:
+        """Return what the controller is told of a measurement."""
+        fault = active(self.faults, t, self.mpc.dt)
+        match fault.kind if fault else "":
+            case "nan measurement":
+                return np.where(np.arange(len(x)) == 0, np.nan, x)
+            case "jumped measurement":
+                assert fault is not None
+                return x + 2.0 * fault.size
+        return x

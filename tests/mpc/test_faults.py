@@ -1,0 +1,45 @@
+"""The fault campaign at 2,000 steps; ``python -m benchmarks faults`` runs more."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.mpc.faults import campaign
+from benchmarks.mpc.faulty import KINDS, active, schedule
+from ocp import MPC, FlightRecorder, Plant, ProblemError, replay_all
+from solvers import MultipleShooting
+from tests.mpc.problems import cart
+
+
+def test_a_schedule_is_seeded_and_leaves_calm_between_faults() -> None:
+    faults = schedule(2000, 3)
+    assert faults == schedule(2000, 3) != schedule(2000, 4)
+    assert {fault.kind for fault in faults} == set(KINDS)
+    gaps = [after.first - before.last for before, after in pairwise(faults)]
+    assert min(gaps) > 10
+    assert active(faults, 0.1 * faults[0].last, 0.1) == faults[0]
+    assert active(faults, 0.1 * (faults[0].last + 1), 0.1) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("subject", "steps"), [("cart", 1600), ("arm", 400)])
+def test_no_fault_gets_through(subject: str, steps: int) -> None:
+    report = campaign(subject, steps, seed=1)
+    assert report.steps == steps
+    assert report.is_clean, report
+    assert set(report.faults) == set(KINDS)
+    assert report.replayed > 0.05 * steps
+
+
+def test_many_steps_are_replayed_with_one_controller(tmp_path: Path) -> None:
+    mpc = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1)
+    with FlightRecorder(mpc, tmp_path / "flight") as recorder:
+        mpc.run(Plant(ocp=cart(mass=1.1)), [1.0, 0.0], 0.5, watch=recorder.watch)
+    found = list(replay_all(mpc, tmp_path / "flight", range(1, 5)))
+    assert [step.record.entry["t"] for step in found] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert all(step.is_exact for step in found)
+    assert not np.array_equal(found[0].record.input, found[1].record.input)
+    with pytest.raises(ProblemError, match="has no step 7"):
+        list(replay_all(mpc, tmp_path / "flight", [2, 7]))
