@@ -88,7 +88,7 @@ def _draw_costs(diverging: Axes, finite: Axes) -> dict[str, np.ndarray]:
         axes.axvline(s.radius, **REFERENCE)
         label(axes, "distance of the link from the centre [m]", "p0", title)
     blank = np.where(np.isfinite(unbounded), unbounded, -1.0)
-    return {"distance [m]": d, "diverging p0, -1 for inf": blank, "finite p0": bounded}
+    return {"distance [m]": d, "diverging p0, -1 for inf [-]": blank, "finite p0 [-]": bounded}
 
 
 def _distance(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
@@ -109,10 +109,11 @@ def _sentence(runs: _Runs) -> str:
     )
     price = float(runs.raised.parameters["weight"][0])
     return (
-        f"Fig. 3.16 ({SCENARIO}, d_b = {radius:g} m): with a cost that diverges at the disc the "
+        f"Fig. 3.16: with a cost that diverges at the disc the "
         f"first controls have no cost, Schuetz ends with {schuetz.name} and shooting with "
         f"{shooting.name}; with a finite one at {_LOW:g} of the price the arm goes through "
         f"(closest link {deep:.3f} m from the centre). Doubling the price to {price:.3g} clears it "
         f"({clear:.3f} m, effort {effort:.2f}); the constraint d >= d_b does so at {least:.3f} m "
-        f"and effort {least_effort:.2f}."
+        f"and effort {least_effort:.2f}. Chosen here: {SCENARIO}, d_b = {radius:g} m, prices "
+        f"doubled from {_LOW:g} on, 75 intervals."
     )

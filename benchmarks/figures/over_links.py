@@ -107,8 +107,8 @@ def _sentence(columns: dict[str, np.ndarray]) -> str:
 
     solved = int(np.isfinite(columns[f"gap, {INDIRECT} [%]"]).sum())
     return (
-        f"Fig. links: of {len(numbers)} random arms direct multiple shooting from its own start comes "
-        f"within 1 % of the best known cost on {best(DIRECT)}, Schuetz with a line search on "
+        f"Fig. links: of {len(numbers)} random arms direct multiple shooting from its own start "
+        f"comes within 1 % of the best known cost on {best(DIRECT)}, Schuetz with a line search on "
         f"{best(SCHUETZ)}, indirect multiple shooting from the direct answer on {best(INDIRECT)} "
         f"(it solves {solved}). From {numbers.min()} to {numbers.max()} links the time grows by "
         f"{ratio('solve time', DIRECT):.1f}, {ratio('solve time', SCHUETZ):.1f} and "

@@ -107,11 +107,11 @@ def _sentence(motions: dict[str, _Motion], from_zero: _Motion) -> str:
     least = min(motion.distance.min() for motion in motions.values())
     radius = arm_scenario(SCENARIO).radius
     return (
-        f"Fig. 3.14 ({SCENARIO}, d_b = {radius:g} m): no link comes closer to the disc's centre "
+        f"Fig. 3.14: no link comes closer to the disc's centre "
         f"than {least:.3f} m, and the start already is at {start:.3f} m. {'; '.join(told)}, all by "
         f"the referee, above the certified optimum of {best:.4f}. Shooting begins with the costate "
         f"of the sound version of Schuetz' method; from psi(t0) = 0 it ends {from_zero.status} at "
         f"{from_zero.cost:.2f}, a link {from_zero.distance.min():.3f} m from the centre. Chosen "
-        f"here: the distance cost of all links, the gains of instantaneous control by a search "
-        f"(tuned_kinematics), Schuetz with 75 Euler steps from y = 0."
+        f"here: {SCENARIO}, d_b = {radius:g} m, the distance cost of all links, the gains "
+        f"of instantaneous control by a search (tuned_kinematics), Schuetz with 75 Euler steps from y = 0."
     )

@@ -14,7 +14,7 @@ from benchmarks.figures.mpc_runs import all_runs, peak
 
 QUICK = ("2.2", "2.3", "2.4", "2.7", "2.8", "2.9", "3.3")
 # These have tests of their own, which draw them.
-ELSEWHERE = ("3.8", "3.9", "3.10", "3.11", "3.13a", "3.13b", "basin")
+ELSEWHERE = ("3.8", "3.9", "3.10", "3.11", "3.13a", "3.13b", "3.15", "basin")
 SLOW = tuple(f.number for f in FIGURES if f.number not in (*QUICK, *ELSEWHERE))
 
 
