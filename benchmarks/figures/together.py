@@ -113,5 +113,6 @@ def _sentence(motions: dict[str, _Motion], from_zero: _Motion) -> str:
         f"of the sound version of Schuetz' method; from psi(t0) = 0 it ends {from_zero.status} at "
         f"{from_zero.cost:.2f}, a link {from_zero.distance.min():.3f} m from the centre. Chosen "
         f"here: {SCENARIO}, d_b = {radius:g} m, the distance cost of all links, the gains "
-        f"of instantaneous control by a search (tuned_kinematics), Schuetz with 75 Euler steps from y = 0."
+        f"of instantaneous control by a search (tuned_kinematics), Schuetz with 75 Euler "
+        f"steps from y = 0."
     )
