@@ -34,9 +34,7 @@ _CHOSEN = (
 @cache
 def run(kind: str, horizon: float = HORIZON) -> Rollout:
     """Return a loop over the whole task, or raise if it ended early."""
-    rollout = loop(arm_scenario(SCENARIO), kind, horizon)
-    assert rollout is not None
-    return rollout.or_raise()
+    return loop(arm_scenario(SCENARIO), kind, horizon).or_raise()
 
 
 def motions() -> Drawing:

@@ -41,7 +41,7 @@ def intervals(horizon: float) -> int:
     return max(1, int(horizon / DT + _ROUNDING))
 
 
-def problem(scenario: ArmScenario, horizon: float, *, to_go: ca.SX | None = None) -> OCP:
+def problem(scenario: ArmScenario, horizon: float) -> OCP:
     """Return the problem over one horizon [s] of a task that ends at ``scenario.horizon``."""
     end, t = scenario.horizon, ca.SX.sym("t")
     ocp = redundancy_ocp(
@@ -96,10 +96,9 @@ def _first(ocp: OCP) -> Solution:
 
 
 @cache
-def tuned(scenario: ArmScenario) -> Repulsion | None:
-    """Return the best gains of instantaneous control for the whole task; None if none holds."""
-    found = tuned_kinematics(scenario, "sum")
-    return found.repulsion if found else None
+def tuned(scenario: ArmScenario) -> Repulsion:
+    """Return the best gains of instantaneous control for the whole task."""
+    return tuned_kinematics(scenario, "sum").repulsion
 
 
 def law(scenario: ArmScenario, repulsion: Repulsion) -> Law:
@@ -108,8 +107,8 @@ def law(scenario: ArmScenario, repulsion: Repulsion) -> Law:
     return Law(law=program.velocity, bounds=JOINTS)
 
 
-def loop(scenario: ArmScenario, kind: str, horizon: float) -> Rollout | None:
-    """Run one closed loop over the whole task; None where no instantaneous control holds.
+def loop(scenario: ArmScenario, kind: str, horizon: float) -> Rollout:
+    """Run one closed loop over the whole task.
 
     Args:
         scenario: arm, path and disc.
@@ -120,8 +119,7 @@ def loop(scenario: ArmScenario, kind: str, horizon: float) -> Rollout | None:
     duration = DT * round(scenario.horizon / DT)
     if kind != INSTANTANEOUS:
         return run(controller(kind, problem(scenario, horizon)), duration=duration)
-    gains = tuned(scenario)
-    return run(law(scenario, gains), duration=duration) if gains else None
+    return run(law(scenario, tuned(scenario)), duration=duration)
 
 
 def cost_until(rollout: Rollout, end: float) -> float:

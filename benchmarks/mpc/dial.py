@@ -32,17 +32,14 @@ def sweep(
             row = known.get((name, kind, horizon, "none"))
             if row is None:
                 row = one(arm_scenario(name), kind, horizon)
-                if row is None:
-                    continue
                 row.append_to(out / LOOPS)
             yield row
 
 
 @cache
-def one(scenario: ArmScenario, kind: str, horizon: float) -> LoopRow | None:
-    """Run one loop; None where no instantaneous control keeps the arm on its path."""
-    rollout = loop(scenario, kind, horizon)
-    return LoopRow.of(scenario.name, kind, horizon, rollout) if rollout else None
+def one(scenario: ArmScenario, kind: str, horizon: float) -> LoopRow:
+    """Run one loop."""
+    return LoopRow.of(scenario.name, kind, horizon, loop(scenario, kind, horizon))
 
 
 def stays_below(

@@ -16,9 +16,7 @@ NAME = "arm-001"
 
 
 def run(kind: str, horizon: float) -> Rollout:
-    rollout = loop(arm_scenario(NAME), kind, horizon)
-    assert rollout is not None
-    return rollout.or_raise()
+    return loop(arm_scenario(NAME), kind, horizon).or_raise()
 
 
 def test_no_control_is_held_for_less_than_a_sampling_interval() -> None:
