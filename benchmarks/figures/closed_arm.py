@@ -150,10 +150,9 @@ def terminations() -> Drawing:
         axes.set_yticks(range(len(names)), names, fontsize=8)
         axes.set_ylim(-0.5, len(names) - 0.5)
         label(axes, "time [s]" if horizon == _LONG else "", "", f"horizon {horizon:g} s")
-        columns |= {
-            "t [s]": rollout.t[:-1],
-            f"termination, horizon {horizon:g} s [-]": np.array(ends),
-        }
+        columns["t [s]"] = rollout.t[:-1]
+        for i, name in enumerate(names):
+            columns[f"ended by '{name}', horizon {horizon:g} s [0 or 1]"] = 1.0 * (index == i)
         shares[horizon] = np.mean(index == names.index("cost decrease below ε"))
     said = ", ".join(f"{100 * share:.0f} % at {horizon:g} s" for horizon, share in shares.items())
     return Drawing(

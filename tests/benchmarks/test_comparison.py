@@ -83,4 +83,4 @@ def test_the_figure_over_the_links():
     drawing = over_links.links(cases)
     assert list(drawing.columns["links [-]"]) == [3, 5]
     assert np.nanmin(drawing.columns[f"gap, {over_links.DIRECT} [%]"]) >= 0.0
-    assert "Links" in drawing.sentence
+    assert drawing.sentence.startswith("Fig. links: ")
