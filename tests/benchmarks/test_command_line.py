@@ -2,8 +2,9 @@
 
 import pytest
 
-from benchmarks.__main__ import BENCH_CASES, BENCH_METHODS, main
+from benchmarks.__main__ import main
 from benchmarks.cases import all_cases
+from benchmarks.commands.bench import BENCH_CASES, BENCH_METHODS
 from benchmarks.methods import all_methods
 from benchmarks.pictures import bench_picture
 from benchmarks.row import RESULTS

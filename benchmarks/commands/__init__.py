@@ -1,0 +1,25 @@
+"""The commands of ``python -m benchmarks``, in the order of its help."""
+
+from benchmarks.commands.answers import CLEAR, GREEDY
+from benchmarks.commands.bench import BENCH
+from benchmarks.commands.command import Command
+from benchmarks.commands.figures import FIGURES_COMMAND
+from benchmarks.commands.listing import LIST
+from benchmarks.commands.loops import FAULTS, MPC
+from benchmarks.commands.run import RUN
+from benchmarks.commands.speed import ARM_SPEED, SPEED
+
+COMMANDS: tuple[Command, ...] = (
+    LIST,
+    RUN,
+    BENCH,
+    FIGURES_COMMAND,
+    SPEED,
+    ARM_SPEED,
+    GREEDY,
+    CLEAR,
+    MPC,
+    FAULTS,
+)
+
+__all__ = ["COMMANDS", "Command"]

@@ -1,0 +1,39 @@
+"""``mpc`` and ``faults``: closed loops, undisturbed and with everything failing."""
+
+from argparse import ArgumentParser, Namespace
+
+from rich.console import Console
+
+from benchmarks.commands.command import Command
+from benchmarks.commands.options import add_out, positive
+from benchmarks.mpc.arm_loop import SOLVERS
+from benchmarks.mpc.commands import print_endings, print_faults, print_loops
+from benchmarks.mpc.dial import COMPARED, SCENARIOS
+
+
+def _mpc_options(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ..."
+    )
+    parser.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
+    parser.add_argument("--short", action="store_true", help="terminal costs, delay, the mass")
+    add_out(parser)
+
+
+def _mpc(options: Namespace, console: Console) -> int:
+    if options.short:
+        return print_endings(console)
+    return print_loops(console, options.out, options.scenarios, options.controllers)
+
+
+def _faults_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--steps", type=positive, default=2000, metavar="K")
+    parser.add_argument("--seed", type=int, default=0)
+
+
+def _faults(options: Namespace, console: Console) -> int:
+    return print_faults(console, options.steps, options.seed)
+
+
+MPC = Command("mpc", "closed loops over the horizon, and other plants", _mpc_options, _mpc)
+FAULTS = Command("faults", "closed loops in which everything fails", _faults_options, _faults)

@@ -1,0 +1,39 @@
+"""``speed`` and ``arm-speed``: what a step of linear control and of MPC on the arm costs."""
+
+from argparse import ArgumentParser, Namespace
+
+from rich.console import Console
+
+from benchmarks.arm_speed import INTERVALS, LINKS
+from benchmarks.arm_speed_tables import print_arm_speed
+from benchmarks.commands.command import Command
+from benchmarks.commands.options import positive
+from benchmarks.linear_speed import HORIZONS
+from benchmarks.speed_tables import print_speed
+
+
+def _linear_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--horizons", nargs="+", type=positive, default=HORIZONS, metavar="N")
+    parser.add_argument("--count", type=positive, default=20, metavar="K", help="steps measured")
+
+
+def _linear(options: Namespace, console: Console) -> int:
+    print_speed(console, options.horizons, options.count)
+    return 0
+
+
+def _arm_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--intervals", nargs="*", type=positive, default=INTERVALS, metavar="N")
+    parser.add_argument("--links", nargs="*", type=positive, default=LINKS, metavar="n")
+    parser.add_argument("--count", type=positive, default=40, metavar="K", help="steps measured")
+
+
+def _arm(options: Namespace, console: Console) -> int:
+    print_arm_speed(console, options.intervals, options.links, options.count)
+    return 0
+
+
+SPEED = Command(
+    "speed", "linear control: a step over N, and beside qpmpc", _linear_options, _linear
+)
+ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
