@@ -1,5 +1,7 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
+from solvers.certify.certificate import Certificate, Check, Estimate, Verdict
+from solvers.certify.certify import Effort, certify
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
@@ -40,8 +42,12 @@ __all__ = [
     "Axis",
     "Batch",
     "BetweenNodes",
+    "Certificate",
+    "Check",
     "Damped",
+    "Effort",
     "Enumeration",
+    "Estimate",
     "Exact",
     "Filtered",
     "FixedStep",
@@ -72,6 +78,8 @@ __all__ = [
     "StepRule",
     "Table",
     "Task",
+    "Verdict",
+    "certify",
     "descend",
     "enumerate_extremals",
     "gpc_loop",

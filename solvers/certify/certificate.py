@@ -1,0 +1,168 @@
+"""A certificate: an optimal value as an interval, and everything that was and was not checked."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from ocp import Solution
+
+_MOST_DIGITS = 16.0
+
+
+class Verdict(Enum):
+    """What came of one check."""
+
+    HOLDS = "holds"
+    FAILS = "FAILS"
+    NOT_CHECKED = "not checked"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One condition, and the number it was judged by.
+
+    Attributes:
+        name: what is asked.
+        verdict: whether it holds.
+        sentence: the evidence, or why it was not checked.
+        value: the number, None where there is none.
+        limit: what the number had to meet.
+        decisive: whether a failure disproves the certificate; LICQ may fail at an optimum.
+    """
+
+    name: str
+    verdict: Verdict
+    sentence: str
+    value: float | None = None
+    limit: float | None = None
+    decisive: bool = True
+
+    @classmethod
+    def at_most(cls, name: str, value: float, limit: float, sentence: str) -> "Check":
+        """Return a check that holds where a number is at most its limit; NaN fails."""
+        verdict = Verdict.HOLDS if value <= limit else Verdict.FAILS
+        return cls(name, verdict, sentence, float(value), limit)
+
+    @classmethod
+    def skipped(cls, name: str, why: str) -> "Check":
+        """Return a check that was not made."""
+        return cls(name, Verdict.NOT_CHECKED, why)
+
+    def __str__(self) -> str:
+        """Return one line."""
+        return f"{self.verdict.value:>11}  {self.name}: {self.sentence}"
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What one method makes of the optimal value.
+
+    Attributes:
+        method: its name, with its settings.
+        cost: the optimal value, as the referee sees it; extrapolated where the method says so.
+        error: the method's own estimate of its error, at least that of the referee.
+        violation: largest violation of any constraint, in the referee's eyes.
+        solution: the finest answer of the method.
+        sentence: how the error was estimated.
+    """
+
+    method: str
+    cost: float
+    error: float
+    violation: float
+    solution: Solution
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """An optimal value with its evidence.
+
+    Attributes:
+        problem: name of the problem.
+        estimates: of independent methods, the most accurate one first.
+        checks: every condition, those that were not checked too.
+    """
+
+    problem: str
+    estimates: tuple[Estimate, ...]
+    checks: tuple[Check, ...]
+
+    @property
+    def cost(self) -> float:
+        """The value of the most accurate method."""
+        return self.estimates[0].cost
+
+    @property
+    def solution(self) -> Solution:
+        """The answer of the most accurate method."""
+        return self.estimates[0].solution
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The cost, give or take its own error or the distance to the second method."""
+        best, second = self.estimates[0], self.estimates[min(1, len(self.estimates) - 1)]
+        error = max(best.error, abs(best.cost - second.cost))
+        return self.cost - error, self.cost + error
+
+    @property
+    def digits(self) -> float:
+        """To how many digits the two most accurate methods agree; 0 with one method only."""
+        if len(self.estimates) < 2:
+            return 0.0
+        return agreement(self.estimates[0].cost, self.estimates[1].cost)
+
+    @property
+    def holds(self) -> bool:
+        """Whether two methods were compared and nothing that was checked failed."""
+        failed = any(c.decisive and c.verdict is Verdict.FAILS for c in self.checks)
+        return len(self.estimates) > 1 and not failed
+
+    @property
+    def not_checked(self) -> tuple[Check, ...]:
+        """What the certificate does not say."""
+        return tuple(c for c in self.checks if c.verdict is Verdict.NOT_CHECKED)
+
+    def with_check(self, check: Check) -> "Certificate":
+        """Return the certificate with one more check."""
+        return replace(self, checks=(*self.checks, check))
+
+    def __str__(self) -> str:
+        """Return the whole certificate as text."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterable[str]:
+        lower, upper = self.interval
+        word = "certified" if self.holds else "NOT certified"
+        yield f"{self.problem}: {word}, {self.cost:.12g} in [{lower:.12g}, {upper:.12g}]"
+        for e in self.estimates:
+            yield f"  {e.method}: {e.cost:.12g} +- {e.error:.1e} ({e.sentence})"
+        for check in self.checks:
+            yield f"  {check}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers and texts, for a file."""
+        return {
+            "problem": self.problem,
+            "cost": self.cost,
+            "interval": list(self.interval),
+            "digits": round(self.digits, 2),
+            "holds": self.holds,
+            "estimates": [
+                {"method": e.method, "cost": e.cost, "error": e.error, "how": e.sentence}
+                for e in self.estimates
+            ],
+            "checks": [
+                {"name": c.name, "verdict": c.verdict.value, "evidence": c.sentence}
+                for c in self.checks
+            ],
+        }
+
+
+def agreement(one: float, other: float) -> float:
+    """Return to how many digits two costs agree, relative to max(1, abs(cost))."""
+    apart = abs(one - other) / max(1.0, abs(one))
+    return _MOST_DIGITS if apart == 0.0 else float(min(_MOST_DIGITS, -np.log10(apart)))

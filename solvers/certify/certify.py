@@ -1,0 +1,141 @@
+"""Certify an optimal value: independent methods, and every condition that can be checked."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ocp import Solution, UnsupportedProblem, whole
+from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
+from solvers.certify.conserved import hamiltonian_check
+from solvers.certify.estimates import (
+    NoEstimateError,
+    by_polish,
+    by_shooting,
+    on_grid,
+)
+from solvers.certify.global_evidence import (
+    EXTREMALS,
+    convexity,
+    every_extremal,
+    other_starts,
+)
+from solvers.certify.grid_conditions import grid_checks
+
+# So many independent methods are compared.
+_METHODS = 2
+AGREEMENT, FEASIBILITY, SECOND_ORDER = "agreement", "feasibility", "second order"
+# Digits asked of two methods: where no path constraint is active, and where one is.
+SMOOTH_DIGITS, OTHER_DIGITS = 8, 5
+_SMOOTH_VIOLATION, _OTHER_VIOLATION = 1e-8, 1e-5
+_SMOOTH_DRIFT, _OTHER_DRIFT = 1e-6, 1e-3
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done for a certificate.
+
+    Attributes:
+        intervals: of the coarsest direct grid, and of the conditions checked on a grid.
+        starts: random starts in the search for something cheaper.
+        seed: of these.
+        enumerate: whether extremals are enumerated where that is possible.
+    """
+
+    intervals: int = 40
+    starts: int = 5
+    seed: int = 0
+    enumerate: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        whole(self.intervals, "certify: intervals")
+        whole(self.starts, "certify: starts")
+
+
+def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
+    """Certify the optimal value of the problem that a solution solves.
+
+    Three methods that share nothing but the problem are taken to the end, as far as they apply:
+    indirect multiple shooting, refined collocation, direct multiple shooting extrapolated over
+    its grids. The two most accurate have to agree to 8 digits where no path constraint is
+    active, to 5 where one is. Then the referee's word on the trajectory, the Hamiltonian, the
+    second-order test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of
+    the optimum being the global one.
+
+    Args:
+        solution: near the optimum that is to be certified; of any method.
+        effort: default ``Effort()``.
+
+    Returns:
+        the certificate; it says itself whether it holds, and what was not checked.
+
+    Raises:
+        UnsupportedProblem: if direct multiple shooting solves the problem on no grid.
+    """
+    effort = effort or Effort()
+    try:
+        coarse = on_grid(solution, effort.intervals)
+    except NoEstimateError as reason:
+        raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
+    estimates, reasons = _estimates(solution, coarse)
+    best = estimates[0]
+    smooth = best.solution.control_kind == "extremal"
+    checks = [
+        _agreement(estimates, smooth, reasons),
+        _feasibility(best, smooth),
+        hamiltonian_check(best.solution, _SMOOTH_DRIFT if smooth else _OTHER_DRIFT),
+        _second_order(best),
+        *grid_checks(coarse),
+        convexity(solution.problem),
+        other_starts(best, effort.starts, effort.seed, len(coarse.t) - 1),
+        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
+    ]
+    return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
+
+
+def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], str]:
+    """What the methods say, the most accurate first, and why others say nothing.
+
+    Doubled grids of direct shooting are asked only where another method is missing: they are
+    the least accurate.
+    """
+    methods: tuple[Callable[[], Estimate], ...] = (
+        lambda: by_polish(solution),
+        lambda: by_shooting(coarse),
+    )
+    found: list[Estimate] = []
+    reasons: list[str] = []
+    for method in methods:
+        if len(found) == _METHODS:
+            break
+        try:
+            found.append(method())
+        except NoEstimateError as reason:
+            reasons.append(str(reason))
+    return sorted(found, key=lambda estimate: estimate.error), " ".join(reasons)
+
+
+def _agreement(estimates: list[Estimate], smooth: bool, reasons: str) -> Check:
+    if len(estimates) < 2:
+        return Check(AGREEMENT, Verdict.FAILS, f"one method only. {reasons}")
+    first, second = estimates[:2]
+    digits, asked = agreement(first.cost, second.cost), SMOOTH_DIGITS if smooth else OTHER_DIGITS
+    said = f"{digits:.1f} digits between {first.method} and {second.method}; {asked} asked"
+    verdict = Verdict.HOLDS if digits >= asked else Verdict.FAILS
+    return Check(AGREEMENT, verdict, said, digits, asked)
+
+
+def _feasibility(best: Estimate, smooth: bool) -> Check:
+    limit = _SMOOTH_VIOLATION if smooth else _OTHER_VIOLATION
+    said = f"the referee sees a violation of {best.violation:.1e}"
+    return Check.at_most(FEASIBILITY, best.violation, limit, said)
+
+
+def _second_order(best: Estimate) -> Check:
+    """The word of ``polish``: no conjugate point."""
+    if best.solution.control_kind != "extremal":
+        return Check.skipped(SECOND_ORDER, "no extremal to test: see the curvature on the grid")
+    if best.solution.status.name == "SOLVED":
+        return Check(SECOND_ORDER, Verdict.HOLDS, "H_uu > 0 and no conjugate point")
+    if best.solution.problem.has_free_time:
+        return Check.skipped(SECOND_ORDER, best.solution.message)
+    return Check(SECOND_ORDER, Verdict.FAILS, best.solution.message)

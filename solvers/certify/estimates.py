@@ -1,0 +1,145 @@
+"""What independent methods make of an optimal value, each with an error estimate of its own."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ocp import OCP, Box, Solution, UnsupportedProblem, evaluate
+from solvers.certify.certificate import Estimate
+from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.polish import polish
+
+# The referee integrates to this, relative.
+TOLERANCE = 1e-11
+# What a polished extremal of the problem without its path constraints may violate of them.
+_INACTIVE = 1e-9
+# Relative change of the cost at which its steps are fine enough; where the second derivatives
+# of the problem jump (smoothness 1), an integrator gains little by more.
+_POLISHED, _POLISHED_ROUGH = 1e-10, 1e-9
+# Ratios of successive differences between which extrapolation is believed: orders 0.6 to 4.3.
+_LEAST_RATIO, _MOST_RATIO = 1.5, 20.0
+_GRIDS = 4
+_MOST_INTERVALS = 1000
+
+
+class NoEstimateError(Exception):
+    """A method says nothing about this problem; the message says why."""
+
+
+def by_polish(solution: Solution) -> Estimate:
+    """Return the value of indirect multiple shooting, steps doubled until the cost holds still.
+
+    Path constraints and state bounds are left out; the extremal counts where the referee finds
+    that it keeps them all the same.
+
+    Raises:
+        NoEstimateError: where the minimum principle does not apply, Newton fails, or a path
+            constraint is active.
+    """
+    ocp = solution.problem
+    try:
+        accuracy = _POLISHED if ocp.smoothness > 1 else _POLISHED_ROUGH
+        polished = polish(solution.with_(problem=_without_path(ocp)), accuracy=accuracy)
+    except UnsupportedProblem as reason:
+        raise NoEstimateError(str(reason)) from None
+    if not polished.status.is_success:
+        raise NoEstimateError(f"{polished.status.value}. {polished.message}")
+    polished = polished.with_(problem=ocp)
+    verdict = evaluate(polished, tolerance=TOLERANCE)
+    if verdict.violation > _INACTIVE:
+        raise NoEstimateError(
+            f"{verdict.worst} is violated by {verdict.violation:.1e}: it is active"
+        )
+    error = max(abs(verdict.cost - polished.cost), verdict.cost_error, polished.residual)
+    said = f"the referee's cost differs by {abs(verdict.cost - polished.cost):.1e}"
+    return Estimate(
+        method=f"indirect multiple shooting, residual {polished.residual:.1e}",
+        cost=verdict.cost,
+        error=error,
+        violation=verdict.violation,
+        solution=polished,
+        sentence=said,
+    )
+
+
+def by_shooting(coarse: Solution) -> Estimate:
+    """Return the value of direct multiple shooting, extrapolated over doubled grids.
+
+    Where successive differences of the cost shrink by a steady ratio, Richardson's extrapolation
+    is taken, and its change from the grids before is its error; where not, the finest cost with
+    its last change.
+
+    Args:
+        coarse: the direct answer on the coarsest grid.
+
+    Raises:
+        NoEstimateError: if a grid is not solved.
+    """
+    answer = coarse
+    verdicts = [evaluate(answer, tolerance=TOLERANCE)]
+    while len(verdicts) < _GRIDS:
+        answer = _solved(MultipleShooting(2 * (len(answer.t) - 1)), answer)
+        verdicts.append(evaluate(answer, tolerance=TOLERANCE))
+    cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
+    return Estimate(
+        method=f"direct multiple shooting, {len(answer.t) - 1} intervals",
+        cost=cost,
+        error=max(error, verdicts[-1].cost_error),
+        violation=verdicts[-1].violation,
+        solution=answer,
+        sentence=said,
+    )
+
+
+def on_grid(solution: Solution, intervals: int) -> Solution:
+    """Return the direct answer on a grid, doubled until the integrator follows the states.
+
+    Raises:
+        NoEstimateError: if that does not come to an end, or a grid is not solved.
+    """
+    while True:
+        try:
+            return _solved(MultipleShooting(intervals), solution)
+        except NoEstimateError:
+            intervals *= 2
+            if intervals > _MOST_INTERVALS:
+                raise
+
+
+def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
+    """Return the limit of costs on grids doubled each time, its error, and how it was found.
+
+    Args:
+        costs: (at least 4,), coarsest first.
+    """
+    steps = np.diff(costs)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = steps[:-1] / steps[1:]
+    last = float(costs[-1])
+    if not all(_LEAST_RATIO <= r <= _MOST_RATIO for r in ratios[-2:]):
+        change = abs(float(steps[-1]))
+        return last, change, "the change under the last doubling; no steady order"
+    limits = costs[2:] + steps[1:] / (ratios - 1.0)
+    order = float(np.log2(ratios[-1]))
+    error = abs(float(limits[-1] - limits[-2]))
+    return float(limits[-1]), error, f"extrapolated with the observed order {order:.2f}"
+
+
+def _solved(solver: MultipleShooting, guess: Solution) -> Solution:
+    data = guess.data
+    program = solver.build(guess.problem)
+    answer = program.run(x0=data.x0, t0=data.t0, parameters=guess.parameters, guess=guess)
+    if not answer.status.is_success:
+        raise NoEstimateError(
+            f"multiple shooting, {solver.intervals} intervals: {answer.status.value}. "
+            f"{answer.message}"
+        )
+    return answer
+
+
+def _without_path(ocp: OCP) -> OCP:
+    """Return the problem without path constraints and state bounds."""
+    kept = tuple(c for c in ocp.constraints if c.at != "path")
+    if len(kept) == len(ocp.constraints) and not ocp.state_bounds.is_active:
+        return ocp
+    return replace(ocp, constraints=kept, state_bounds=Box())

@@ -1,0 +1,186 @@
+"""Each check of a certificate: it holds where it should, and fails where something is wrong."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from models import bryson_denham, double_integrator_energy, van_der_pol
+from ocp import OCP, Box, Constraint, FreeTime, Model, Signal, solve
+from solvers import Check, MultipleShooting, Verdict, polish
+from solvers.certify.certificate import agreement
+from solvers.certify.conserved import hamiltonian_check
+from solvers.certify.estimates import extrapolated
+from solvers.certify.global_evidence import convexity
+from solvers.certify.grid_conditions import grid_checks
+
+LIMIT = 1e-6
+
+
+def integrator(**changes) -> OCP:
+    """x' = u from 1, int u^2 over 1 s, x(1) = 0: u = -1."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    parts = {
+        "name": "integrator",
+        "model": Model(name="integrator", x=x, u=u, f=u),
+        "x0": [1.0],
+        "horizon": 1.0,
+        "running_cost": u**2,
+        "constraints": (Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    }
+    return OCP(**(parts | {k: v(x, u) if callable(v) else v for k, v in changes.items()}))
+
+
+def direct(ocp: OCP, intervals: int = 20):
+    return solve(ocp, MultipleShooting(intervals)).or_raise()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "digits"), [(1.0, 1.0, 16), (2.0, 2.0 + 2e-8, 8), (0.0, 1e-5, 5)]
+)
+def test_agreement_counts_digits(one, other, digits):
+    assert agreement(one, other) == pytest.approx(digits, abs=1e-6)
+
+
+def test_a_number_that_is_not_one_fails():
+    assert Check.at_most("x", np.nan, 1.0, "").verdict is Verdict.FAILS
+
+
+# -- extrapolation -------------------------------------------------------------------------
+
+
+@given(st.floats(-100, 100), st.floats(0.1, 10), st.floats(1.0, 4.0), st.sampled_from([-1.0, 1.0]))
+def test_extrapolation_finds_the_limit_of_a_power(limit, size, order, sign):
+    costs = limit + sign * size * 2.0 ** (-order * np.arange(4))
+    found, error, _ = extrapolated(costs)
+    assert found == pytest.approx(limit, abs=1e-9 * (1 + abs(limit) + size))
+    assert error <= 1e-9 * (1 + abs(limit) + size)
+
+
+@pytest.mark.parametrize(
+    "costs", [(1.0, 1.0, 1.0, 1.0), (1.0, 2.0, 1.0, 2.0), (4.0, 3.0, 2.0, 1.0)]
+)
+def test_without_a_steady_order_the_last_cost_stands_with_its_change(costs):
+    found, error, said = extrapolated(np.array(costs))
+    assert found == costs[-1]
+    assert error == abs(costs[-1] - costs[-2])
+    assert "no steady order" in said
+
+
+# -- Hamiltonian ---------------------------------------------------------------------------
+
+
+def test_the_hamiltonian_of_an_extremal_is_constant_and_of_another_trajectory_is_not():
+    extremal = polish(direct(van_der_pol(), 75))
+    assert hamiltonian_check(extremal, LIMIT).verdict is Verdict.HOLDS
+    turned = extremal.with_(costate=1.01 * extremal.costate)
+    assert hamiltonian_check(turned, LIMIT).verdict is Verdict.FAILS
+
+
+def test_time_in_the_problem_is_taken_off():
+    x, u, t = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("t")
+    ocp = OCP(
+        name="aging",
+        model=Model(name="aging", x=x, u=u, t=t, f=u),
+        x0=[1.0],
+        horizon=1.0,
+        running_cost=(1 + t) * u**2,
+        constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    )
+    extremal = polish(direct(ocp))
+    check = hamiltonian_check(extremal, LIMIT)
+    assert check.verdict is Verdict.HOLDS
+    assert "with the time" in check.sentence
+
+
+def test_at_a_free_final_time_the_hamiltonian_is_zero():
+    ocp = integrator(horizon=FreeTime(1.0, 0.1, 10.0), running_cost=lambda x, u: 1 + u**2)
+    extremal = polish(direct(ocp))
+    assert extremal.duration == pytest.approx(1.0, abs=1e-8)
+    assert hamiltonian_check(extremal, LIMIT).verdict is Verdict.HOLDS
+    shifted = extremal.with_(costate=extremal.costate * 1.001)
+    assert hamiltonian_check(shifted, LIMIT).verdict is Verdict.FAILS
+
+
+def test_a_signal_and_a_moving_constraint_are_not_checked():
+    x, u, t, w = (ca.SX.sym(name) for name in "xutw")
+    moving = Constraint("moving", x - t, -5.0, 5.0)
+    model = Model(name="m", x=x, u=u, t=t, f=u)
+    parts = {"name": "m", "model": model, "x0": [1.0], "horizon": 1.0}
+    tracked = OCP(
+        **parts,
+        running_cost=u**2 + (x - w) ** 2,
+        parameters=(Signal("w", w, np.linspace(0, 1, 5)),),
+    )
+    walled = OCP(**parts, running_cost=u**2 + x**2, constraints=(moving,))
+    for ocp, word in ((tracked, "'w'"), (walled, "'moving'")):
+        check = hamiltonian_check(direct(ocp), LIMIT)
+        assert check.verdict is Verdict.NOT_CHECKED
+        assert word in check.sentence
+
+
+# -- conditions on a grid ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("build", [double_integrator_energy, bryson_denham, van_der_pol])
+def test_the_grid_conditions_hold_at_an_optimum(build):
+    assert all(check.verdict is Verdict.HOLDS for check in grid_checks(direct(build())))
+
+
+def test_a_trajectory_that_is_not_optimal_is_seen():
+    best = direct(integrator())
+    bent = best.u + 0.05 * np.sin(2 * np.pi * best.t[:-1])[:, None]
+    states = np.concatenate([[1.0], 1.0 + np.cumsum(bent[:, 0]) / len(bent)])[:, None]
+    check = grid_checks(best.with_(u=bent, x=states))[1]
+    assert check.verdict is Verdict.FAILS
+
+
+def test_a_multiplier_of_the_wrong_sign_is_named():
+    """Held at its bound against the slope of the cost."""
+    free = integrator(constraints=(), running_cost=lambda x, u: x**2 + u**2)
+    bounded = integrator(
+        constraints=(),
+        running_cost=lambda x, u: x**2 + u**2,
+        control_bounds=Box([-10.0], [0.5]),
+    )
+    best = direct(free)
+    u = np.full_like(best.u, 0.5)
+    x = np.concatenate([[1.0], 1.0 + np.cumsum(u[:, 0]) / len(u)])[:, None]
+    check = grid_checks(best.with_(problem=bounded, u=u, x=x))[1]
+    assert check.verdict is Verdict.FAILS
+    assert "bound of u" in check.sentence
+
+
+def test_a_constraint_written_twice_fails_licq_but_not_optimality():
+    twice = integrator(
+        constraints=lambda x, u: (
+            Constraint("end", x, 0.0, 0.0, at="terminal"),
+            Constraint("end again", 2 * x, 0.0, 0.0, at="terminal"),
+        )
+    )
+    dependent, multipliers, _ = grid_checks(direct(twice))
+    assert dependent.verdict is Verdict.FAILS
+    assert not dependent.decisive
+    assert "end" in dependent.sentence
+    assert multipliers.verdict is Verdict.HOLDS
+
+
+def test_a_maximum_curves_the_wrong_way():
+    """u = 0 is a stationary point of -u^2/2 + u^4/4, and a maximum."""
+    ocp = integrator(constraints=(), running_cost=lambda x, u: -(u**2) / 2 + u**4 / 4)
+    best = direct(ocp)
+    still = best.with_(u=np.zeros_like(best.u), x=np.ones_like(best.x))
+    _, multipliers, curvature = grid_checks(still)
+    assert multipliers.verdict is Verdict.HOLDS
+    assert curvature.verdict is Verdict.FAILS
+
+
+# -- the whole -----------------------------------------------------------------------------
+
+
+def test_convexity_is_seen_and_its_absence_named():
+    assert convexity(double_integrator_energy()).verdict is Verdict.HOLDS
+    check = convexity(van_der_pol())
+    assert check.verdict is Verdict.NOT_CHECKED
+    assert "not linear" in check.sentence
