@@ -110,11 +110,11 @@ def test_the_referee_integrates_a_parabola_exactly() -> None:
 def test_costates_and_stationarity_are_derivatives_of_the_cost() -> None:
     """abs(u - (u - dJ/dc / weight)) with dJ/dc by differences; costates by moving the start."""
     ocp = pendulum()
-    solution = curved()
-    slope = gradient(lambda x: evaluate(curved(x0=x)).cost, ocp.start(), step=1e-3)
+    solution = curved(ocp=ocp)
+    slope = gradient(lambda x: evaluate(curved(ocp=ocp, x0=x)).cost, ocp.start(), step=1e-3)
     np.testing.assert_allclose(costates_along(solution).costate[0], slope, atol=MINIMISER)
     flat = gradient(
-        lambda c: evaluate(curved(u=c.reshape(C.shape))).cost, C.ravel(), step=1e-3
+        lambda c: evaluate(curved(ocp=ocp, u=c.reshape(C.shape))).cost, C.ravel(), step=1e-3
     ).reshape(3, 3, 2)
     weight = np.diff(T[BREAKS])[:, None, None] / 3
     assert evaluate(solution).stationarity == pytest.approx(
