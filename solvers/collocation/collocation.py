@@ -167,7 +167,7 @@ class CollocationProgram(Program):
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
         if x is None:
-            schedule = self._schedule(data, c, duration, grid.nodes)
+            schedule = self._schedule(data, self._elevated(c), duration, grid.nodes)
             x = np.vstack([data.x0, self.rollout(data.x0, *schedule)[0].T])
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (len(grid.nodes), 1))
@@ -190,37 +190,67 @@ class CollocationProgram(Program):
         return np.vstack(parts)
 
     def _schedule(
-        self, data: Data, c: np.ndarray, duration: float, nodes: np.ndarray
+        self, data: Data, u: np.ndarray, duration: float, nodes: np.ndarray
     ) -> list[np.ndarray]:
-        """Controls, times, lengths and parameters of steps between fractions of the horizon."""
-        grid = self.transcription.grid
-        count, nu = grid.mesh.intervals, self.transcription.ocp.model.nu
-        edges = np.asarray(grid.mesh.edges)
-        pieces = Pieces(edges, self._elevated(c).reshape(count, -1, nu))
+        """Controls of coefficients (K m, nu), times, lengths, parameters of steps."""
+        pieces = self._polynomials(u)
         middle = (nodes[1:] + nodes[:-1]) / 2
         piece = pieces.of(middle)
-        u = [pieces.at(at, piece).T for at in (nodes[:-1], middle, nodes[1:])]
+        drive = [pieces.at(at, piece).T for at in (nodes[:-1], middle, nodes[1:])]
         left, right = data.values.on(nodes)
         t, h = data.t0 + nodes[None, :-1] * duration, np.diff(nodes)[None, :] * duration
-        return [*u, t, h, left.T, right.T]
+        return [*drive, t, h, left.T, right.T]
+
+    def _polynomials(self, u: np.ndarray) -> Pieces:
+        """The controls of coefficients (K m, nu) over fractions of the horizon."""
+        mesh, nu = self.transcription.grid.mesh, self.transcription.ocp.model.nu
+        return Pieces(np.asarray(mesh.edges), u.reshape(mesh.intervals, -1, nu))
 
     # -- the answer --------------------------------------------------------------------------
 
-    def errors(self, w: np.ndarray, data: Data) -> np.ndarray:
-        """Return by how much the dynamics miss each node from the one before, (N, nx).
+    def errors(self, solution: Solution) -> np.ndarray:
+        """Return the error of each interval of a solution of this program, (K,).
 
-        Relative to 1 + the largest abs(x) of each state along the trajectory.
+        By how much the dynamics, integrated from node to node under its controls, miss a state,
+        relative to 1 + the largest abs(x) of that state along the trajectory, or the running
+        cost misses the quadrature of the interval, relative to 1 + abs(cost).
         """
-        tr, nodes = self.transcription, self.transcription.grid.nodes
-        inside = np.arange(_STEPS) / _STEPS
+        begins = self.transcription.grid.edge_nodes[:-1]
+        given = (solution.x, solution.u, solution.duration, solution.data)
+        moved, costs = self._missed(*given)
+        of_cost = np.add.reduceat(costs, begins) - self._quadrature(*given)
+        return np.maximum(
+            np.maximum.reduceat(moved.max(axis=1), begins),
+            np.abs(of_cost) / (1.0 + abs(solution.cost)),
+        )
+
+    def _quadrature(self, x: np.ndarray, u: np.ndarray, duration: float, data: Data) -> np.ndarray:
+        """Running cost of each interval by the weights of its points, (K,)."""
+        grid, ocp = self.transcription.grid, self.transcription.ocp
+        at_points = self._polynomials(u).at(grid.at, grid.owner)
+        t, p = data.t0 + grid.at * duration, data.values.at(grid.at, -1)
+        now = (x[grid.point_nodes].T, at_points.T, t[None, :], p.T)
+        costs = np.array(ocp.functions.running_cost.map(len(t))(*now)).ravel()
+        weights = np.concatenate([scheme.b for scheme in grid.points])
+        share = np.bincount(grid.owner, weights * costs, grid.mesh.intervals)
+        return duration * grid.mesh.widths * share
+
+    def _missed(
+        self, x: np.ndarray, u: np.ndarray, duration: float, data: Data
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Errors of the states at the nodes (N, nx), and the running cost up to each (N,)."""
+        nodes, inside = self.transcription.grid.nodes, np.arange(_STEPS) / _STEPS
         fine = (nodes[:-1, None] + inside * np.diff(nodes)[:, None]).ravel()
-        schedule = self._schedule(data, tr.split(w).c.T, tr.duration(w), np.append(fine, 1.0))
-        x = self._states(w)
-        after = self.between(x[:-1].T, *schedule)[0][:, _STEPS - 1 :: _STEPS].T
-        return np.abs(after - x[1:]) / (1.0 + np.abs(x).max(axis=0))
+        schedule = self._schedule(data, u, duration, np.append(fine, 1.0))
+        steps, costs = self.between(x[:-1].T, *schedule)
+        after = steps[:, _STEPS - 1 :: _STEPS].T
+        moved = np.abs(after - x[1:]) / (1.0 + np.abs(x).max(axis=0))
+        return moved, costs.reshape(-1, _STEPS).sum(axis=1)
 
     def _error(self, answer: Answer, data: Data) -> tuple[float, int]:
-        moved = self.errors(answer.w, data).max(axis=1)
+        tr = self.transcription
+        u, duration = self._elevated(tr.split(answer.w).c.T), tr.duration(answer.w)
+        moved = self._missed(self._states(answer.w), u, duration, data)[0].max(axis=1)
         worst = int(moved.argmax())
         return float(moved[worst]), worst + 1
 

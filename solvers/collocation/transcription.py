@@ -146,12 +146,12 @@ class Collocated:
     @cached_property
     def _first(self) -> ca.Function:
         """What a free start alone decides of the path constraints."""
-        m, free = self.ocp.model, self.ocp.has_free_start
-        path: ca.SX = ca.vertcat(ca.SX(0, 1), *[c.expression for c in self.ocp.at("path")])
-        alone = [int(i) for i in np.flatnonzero(~self.ocp.functions.path_on_control) if free]
-        return ca.Function(
-            "first", [m.x, m.t, self.ocp.p], [ca.vertcat(ca.SX(0, 1), *[path[i] for i in alone])]
-        )
+        m, alone = self.ocp.model, ~self.ocp.functions.path_on_control
+        expressions = [e for c in self.ocp.at("path") for e in ca.vertsplit(c.expression)]
+        free = self.ocp.has_free_start
+        wanted = [e for e, is_alone in zip(expressions, alone, strict=True) if is_alone and free]
+        first = ca.vertcat(ca.SX(0, 1), *wanted)
+        return ca.Function("first", [m.x, m.t, self.ocp.p], [first])
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
