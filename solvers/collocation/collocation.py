@@ -1,7 +1,7 @@
 """Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
 
@@ -10,29 +10,23 @@ from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
-    RK4,
-    Buffered,
     Data,
-    Pieces,
     ProblemError,
     Program,
     Solution,
     Solver,
-    Stage,
     Start,
     UnsupportedProblem,
     elevated,
     instance,
 )
 from solvers.collocation.costates import costates
+from solvers.collocation.gaps import Gaps
 from solvers.collocation.mesh import Grid, Mesh
 from solvers.collocation.points import Family, Points
 from solvers.collocation.transcription import Collocated, Unknowns
 from solvers.direct.backend import Answer, Backend
 from solvers.direct.search import Found, Search
-
-# Steps of RK4 from node to node, to see how far the polynomials are from the dynamics.
-_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -107,13 +101,7 @@ class Collocation(Solver):
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
             )
         grid = Grid.of(self.chosen_mesh, self.points)
-        step, gaps = Stage.of(ocp, RK4(), held=False, curved=True).step, len(grid.nodes) - 1
-        program = CollocationProgram(
-            solver=self,
-            transcription=Collocated(ocp, grid),
-            between=Buffered(step.mapaccum(_STEPS).map(gaps)),
-            rollout=Buffered(step.mapaccum(gaps)),
-        )
+        program = CollocationProgram(self, Collocated(ocp, grid), Gaps.of(ocp, grid))
         program.search.nlp  # noqa: B018 - all symbolic work is done here
         return program
 
@@ -125,14 +113,12 @@ class CollocationProgram(Program):
     Attributes:
         solver: the options.
         transcription: the problem on its points.
-        between: some steps from every node to the next, each from its own state.
-        rollout: one step from node to node, for first guesses.
+        gaps: the dynamics between the nodes.
     """
 
     solver: Collocation
     transcription: Collocated
-    between: Buffered = field(repr=False)
-    rollout: Buffered = field(repr=False)
+    gaps: Gaps
 
     def run(
         self,
@@ -167,8 +153,7 @@ class CollocationProgram(Program):
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
         if x is None:
-            schedule = self._schedule(data, self._elevated(c), duration, grid.nodes)
-            x = np.vstack([data.x0, self.rollout(data.x0, *schedule)[0].T])
+            x = self.gaps.rollout(self._elevated(c), duration, data)
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (len(grid.nodes), 1))
         z = x[grid.edge_nodes].T
@@ -189,68 +174,12 @@ class CollocationProgram(Program):
         parts = [elevated(c[grid.owner == k], most) for k in range(grid.mesh.intervals)]
         return np.vstack(parts)
 
-    def _schedule(
-        self, data: Data, u: np.ndarray, duration: float, nodes: np.ndarray
-    ) -> list[np.ndarray]:
-        """Controls of coefficients (K m, nu), times, lengths, parameters of steps."""
-        pieces = self._polynomials(u)
-        middle = (nodes[1:] + nodes[:-1]) / 2
-        piece = pieces.of(middle)
-        drive = [pieces.at(at, piece).T for at in (nodes[:-1], middle, nodes[1:])]
-        left, right = data.values.on(nodes)
-        t, h = data.t0 + nodes[None, :-1] * duration, np.diff(nodes)[None, :] * duration
-        return [*drive, t, h, left.T, right.T]
-
-    def _polynomials(self, u: np.ndarray) -> Pieces:
-        """The controls of coefficients (K m, nu) over fractions of the horizon."""
-        mesh, nu = self.transcription.grid.mesh, self.transcription.ocp.model.nu
-        return Pieces(np.asarray(mesh.edges), u.reshape(mesh.intervals, -1, nu))
-
     # -- the answer --------------------------------------------------------------------------
 
-    def errors(self, solution: Solution) -> np.ndarray:
-        """Return the error of each interval of a solution of this program, (K,).
-
-        By how much the dynamics, integrated from node to node under its controls, miss a state,
-        relative to 1 + the largest abs(x) of that state along the trajectory, or the running
-        cost misses the quadrature of the interval, relative to 1 + abs(cost).
-        """
-        begins = self.transcription.grid.edge_nodes[:-1]
-        given = (solution.x, solution.u, solution.duration, solution.data)
-        moved, costs = self._missed(*given)
-        of_cost = np.add.reduceat(costs, begins) - self._quadrature(*given)
-        return np.maximum(
-            np.maximum.reduceat(moved.max(axis=1), begins),
-            np.abs(of_cost) / (1.0 + abs(solution.cost)),
-        )
-
-    def _quadrature(self, x: np.ndarray, u: np.ndarray, duration: float, data: Data) -> np.ndarray:
-        """Running cost of each interval by the weights of its points, (K,)."""
-        grid, ocp = self.transcription.grid, self.transcription.ocp
-        at_points = self._polynomials(u).at(grid.at, grid.owner)
-        t, p = data.t0 + grid.at * duration, data.values.at(grid.at, -1)
-        now = (x[grid.point_nodes].T, at_points.T, t[None, :], p.T)
-        costs = np.array(ocp.functions.running_cost.map(len(t))(*now)).ravel()
-        weights = np.concatenate([scheme.b for scheme in grid.points])
-        share = np.bincount(grid.owner, weights * costs, grid.mesh.intervals)
-        return duration * grid.mesh.widths * share
-
-    def _missed(
-        self, x: np.ndarray, u: np.ndarray, duration: float, data: Data
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Errors of the states at the nodes (N, nx), and the running cost up to each (N,)."""
-        nodes, inside = self.transcription.grid.nodes, np.arange(_STEPS) / _STEPS
-        fine = (nodes[:-1, None] + inside * np.diff(nodes)[:, None]).ravel()
-        schedule = self._schedule(data, u, duration, np.append(fine, 1.0))
-        steps, costs = self.between(x[:-1].T, *schedule)
-        after = steps[:, _STEPS - 1 :: _STEPS].T
-        moved = np.abs(after - x[1:]) / (1.0 + np.abs(x).max(axis=0))
-        return moved, costs.reshape(-1, _STEPS).sum(axis=1)
-
     def _error(self, answer: Answer, data: Data) -> tuple[float, int]:
-        tr = self.transcription
-        u, duration = self._elevated(tr.split(answer.w).c.T), tr.duration(answer.w)
-        moved = self._missed(self._states(answer.w), u, duration, data)[0].max(axis=1)
+        w, tr = answer.w, self.transcription
+        u = self._elevated(tr.split(w).c.T)
+        moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
         worst = int(moved.argmax())
         return float(moved[worst]), worst + 1
 

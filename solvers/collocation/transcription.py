@@ -140,7 +140,7 @@ class Collocated:
             [p.b[:, None] for p in points],
             [p.B for p in points],
         )
-        spread, a, b, basis = (ca.sparsify(ca.DM(block_diag(*rows))) for rows in blocks)
+        spread, a, b, basis = (ca.sparsify(ca.DM(np.asarray(block_diag(*rows)))) for rows in blocks)
         return spread, a, b, basis
 
     @cached_property
