@@ -27,6 +27,7 @@ from ocp.mpc.recorder import FlightRecorder, Record, Replay, records, replay, re
 from ocp.mpc.rollout import Rollout
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
+from ocp.pieces import Pieces, bernstein, elevated
 from ocp.problem import OCP, FreeTime
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution import Solution, Work
@@ -67,6 +68,7 @@ __all__ = [
     "Outcome",
     "Parameter",
     "ParameterValues",
+    "Pieces",
     "Plant",
     "Polyhedron",
     "ProblemError",
@@ -86,11 +88,13 @@ __all__ = [
     "Transcription",
     "UnsupportedProblem",
     "Work",
+    "bernstein",
     "closed_loop",
     "compiled",
     "costates_along",
     "derive",
     "discretise",
+    "elevated",
     "evaluate",
     "hamiltonian",
     "instance",

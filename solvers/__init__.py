@@ -2,6 +2,9 @@
 
 from solvers.certify.certificate import Certificate, Check, Estimate, Verdict
 from solvers.certify.certify import Effort, certify
+from solvers.collocation.collocation import Collocation
+from solvers.collocation.mesh import Mesh
+from solvers.collocation.refined import Refinement, Round, refined
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
@@ -44,6 +47,7 @@ __all__ = [
     "BetweenNodes",
     "Certificate",
     "Check",
+    "Collocation",
     "Damped",
     "Effort",
     "Enumeration",
@@ -65,12 +69,15 @@ __all__ = [
     "LinearMPC",
     "LocalOptimum",
     "Manifold",
+    "Mesh",
     "MultipleShooting",
     "ParameterContinuation",
     "PrioritisedKinematics",
+    "Refinement",
     "Repulsion",
     "ReverseShooting",
     "Riccati",
+    "Round",
     "Scan",
     "Schuetz",
     "SecondOrder",
@@ -88,6 +95,7 @@ __all__ = [
     "prioritised_velocity",
     "raise_until_clear",
     "random_guesses",
+    "refined",
     "repel",
     "second_order",
     "seeds_around",

@@ -155,7 +155,7 @@ class Ladder:
     def _excess(self, plan: Solution, moment: Moment) -> tuple[float, str]:
         """Return by how much a new plan violates the constraints; inf where it is none."""
         if plan.status.is_success:
-            u, ends = plan.u[: len(plan.t) - 1], self._ends(moment, plan.t)
+            u, ends = controls(plan, plan.t[:-1]), self._ends(moment, plan.t)
             return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
         if plan.status in _USABLE:
             return self._rehearsed(plan, moment)

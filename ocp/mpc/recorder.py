@@ -17,7 +17,7 @@ from ocp.solution import Solution
 from ocp.status import Status
 
 _FORMAT = "flight record, version 1"
-_PLAN = ("t", "x", "x0", "costate", "u")
+_PLAN = ("t", "x", "x0", "costate", "u", "breaks")
 
 
 class FlightRecorder:
@@ -226,7 +226,8 @@ def _parameters(record: Record) -> dict[str, np.ndarray]:
 def _plan(mpc: MPC, record: Record) -> Solution | None:
     if "plan" not in record.entry:
         return None
-    t, x, x0, costate, u = (record.arrays[f"plan/{name}"] for name in _PLAN)
+    held = record.arrays
+    t, x, x0, costate, u = (held[f"plan/{name}"] for name in _PLAN if name != "breaks")
     return Solution(
         problem=mpc.ocp,
         solver=repr(mpc.solver),
@@ -236,6 +237,7 @@ def _plan(mpc: MPC, record: Record) -> Solution | None:
         x0=x0,
         costate=costate,
         u=u,
+        breaks=held.get("plan/breaks", np.empty(0)),  # files of before there were any
         control_kind=record.entry["plan"]["kind"],
         cost=0.0,
         parameters=_parameters(record),

@@ -13,7 +13,8 @@ def shifted(plan: Solution, t0: float) -> Guess:
     goes on as it ended: states along their last slope, controls held, costates at their final
     value (what the transversality condition makes them anyway).
     """
-    times = plan.t - plan.t[0] + t0
+    # Equally spaced, as the rows of a guess are; the nodes of a plan need not be.
+    times = t0 + np.linspace(0.0, plan.duration, len(plan.t))
     nx = plan.x.shape[1]
     both = _along(times, plan.t, np.hstack([plan.x, plan.costate]))
     x, costate = both[:, :nx], both[:, nx:]
@@ -31,6 +32,8 @@ def controls(plan: Solution, times: np.ndarray) -> np.ndarray:
     if plan.control_kind == "held":
         index = np.searchsorted(plan.t, times + 1e-9 * plan.duration, side="right") - 1
         return plan.u[np.minimum(np.maximum(index, 0), len(plan.u) - 1)]
+    if plan.control_kind == "polynomial":
+        return plan.pieces.at(times)
     return _along(times, plan.t, plan.u)
 
 
