@@ -76,6 +76,11 @@ class Estimate:
     solution: Solution
     sentence: str
 
+    @property
+    def is_extremal(self) -> bool:
+        """Whether the answer solves the boundary value problem of the minimum principle."""
+        return self.solution.control_kind == "extremal"
+
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
@@ -83,7 +88,7 @@ class Certificate:
 
     Attributes:
         problem: name of the problem.
-        estimates: of independent methods, the most accurate one first.
+        estimates: of independent methods: an extremal first, then the most accurate one.
         checks: every condition, those that were not checked too.
     """
 
@@ -93,12 +98,12 @@ class Certificate:
 
     @property
     def cost(self) -> float:
-        """The value of the most accurate method."""
+        """The value of the first method."""
         return self.estimates[0].cost
 
     @property
     def solution(self) -> Solution:
-        """The answer of the most accurate method."""
+        """The answer of the first method."""
         return self.estimates[0].solution
 
     @property
@@ -110,7 +115,7 @@ class Certificate:
 
     @property
     def digits(self) -> float:
-        """To how many digits the two most accurate methods agree; 0 with one method only."""
+        """To how many digits the first two methods agree; 0 with one method only."""
         if len(self.estimates) < 2:
             return 0.0
         return agreement(self.estimates[0].cost, self.estimates[1].cost)

@@ -8,6 +8,7 @@ from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, a
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.estimates import (
     NoEstimateError,
+    by_collocation,
     by_polish,
     by_shooting,
     on_grid,
@@ -78,7 +79,7 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
     estimates, reasons = _estimates(solution, coarse)
     best = estimates[0]
-    smooth = best.solution.control_kind == "extremal"
+    smooth = best.is_extremal
     checks = [
         _agreement(estimates, smooth, reasons),
         _feasibility(best, smooth),
@@ -93,13 +94,14 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
 
 
 def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], str]:
-    """What the methods say, the most accurate first, and why others say nothing.
+    """What the methods say, an extremal first, then the most accurate, and why others say nothing.
 
     Doubled grids of direct shooting are asked only where another method is missing: they are
     the least accurate.
     """
     methods: tuple[Callable[[], Estimate], ...] = (
         lambda: by_polish(solution),
+        lambda: by_collocation(coarse),
         lambda: by_shooting(coarse),
     )
     found: list[Estimate] = []
@@ -111,7 +113,8 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], st
             found.append(method())
         except NoEstimateError as reason:
             reasons.append(str(reason))
-    return sorted(found, key=lambda estimate: estimate.error), " ".join(reasons)
+    found.sort(key=lambda estimate: (not estimate.is_extremal, estimate.error))
+    return found, " ".join(reasons)
 
 
 def _agreement(estimates: list[Estimate], smooth: bool, reasons: str) -> Check:
@@ -132,7 +135,7 @@ def _feasibility(best: Estimate, smooth: bool) -> Check:
 
 def _second_order(best: Estimate) -> Check:
     """The word of ``polish``: no conjugate point."""
-    if best.solution.control_kind != "extremal":
+    if not best.is_extremal:
         return Check.skipped(SECOND_ORDER, "no extremal to test: see the curvature on the grid")
     if best.solution.status.name == "SOLVED":
         return Check(SECOND_ORDER, Verdict.HOLDS, "H_uu > 0 and no conjugate point")

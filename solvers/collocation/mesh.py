@@ -52,6 +52,16 @@ class Mesh:
         """Lengths as fractions of the horizon, (K,)."""
         return np.diff(self.edges)
 
+    def cut(self, parts: int, which: np.ndarray | None = None) -> "Mesh":
+        """Return the mesh with intervals cut into equal parts, (K,) of bool says which."""
+        chosen = np.ones(self.intervals, dtype=bool) if which is None else which
+        edges, degrees = [0.0], []
+        for right, degree, cut in zip(self.edges[1:], self.degrees, chosen, strict=True):
+            count = parts if cut else 1
+            edges += np.linspace(edges[-1], right, count + 1)[1:].tolist()
+            degrees += [degree] * count
+        return Mesh(tuple(edges), tuple(degrees))
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
