@@ -61,6 +61,8 @@ class Certificates:
 def certify_case(case: Case, effort: Effort) -> Certificate:
     """Certify the best optimum that a few direct starts find.
 
+    The problem's own guess is the first of them.
+
     Raises:
         SolverError: if none of them is feasible.
         UnsupportedProblem: if no method says anything.

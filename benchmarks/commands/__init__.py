@@ -2,6 +2,7 @@
 
 from benchmarks.commands.answers import CLEAR, GREEDY
 from benchmarks.commands.bench import BENCH
+from benchmarks.commands.certify import CERTIFY
 from benchmarks.commands.command import Command
 from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
@@ -13,6 +14,7 @@ COMMANDS: tuple[Command, ...] = (
     LIST,
     RUN,
     BENCH,
+    CERTIFY,
     FIGURES_COMMAND,
     SPEED,
     ARM_SPEED,

@@ -15,7 +15,7 @@ from ocp import OCPError
 from solvers import Effort
 
 COMMITTED = Path("benchmarks") / "data" / "certificates.json"
-_SUITES = ("textbook", "library")
+_SUITE = "library"
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def _run(options: Namespace, console: Console) -> int:
 def _wanted(names: list[str]) -> list[Case]:
     if names:
         return named(all_cases(), names, "case", by_beginning=True)
-    return [case for case in all_cases() if case.suite in _SUITES]
+    return [case for case in all_cases() if case.suite == _SUITE]
 
 
 def _table(cases: list[Case], on_file: Certificates) -> Table:

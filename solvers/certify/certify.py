@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ocp import Solution, UnsupportedProblem, whole
 from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
 from solvers.certify.conserved import hamiltonian_check
+from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
 from solvers.certify.estimates import (
     NoEstimateError,
     by_collocation,
@@ -55,9 +56,9 @@ class Effort:
 def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     """Certify the optimal value of the problem that a solution solves.
 
-    Three methods that share nothing but the problem are taken to the end, as far as they apply:
+    Methods that share nothing but the problem are taken to the end, as far as they apply:
     indirect multiple shooting, refined collocation, direct multiple shooting extrapolated over
-    its grids. The two most accurate have to agree to 8 digits where no path constraint is
+    its grids; in discrete time the nonlinear program and a linear method. The two most accurate have to agree to 8 digits where no path constraint is
     active, to 5 where one is. Then the referee's word on the trajectory, the Hamiltonian, the
     second-order test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of
     the optimum being the global one.
@@ -104,6 +105,8 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], st
         lambda: by_collocation(coarse),
         lambda: by_shooting(coarse),
     )
+    if solution.problem.model.is_discrete:
+        methods = (lambda: by_nonlinear_program(coarse), lambda: by_linear_method(coarse))
     found: list[Estimate] = []
     reasons: list[str] = []
     for method in methods:
