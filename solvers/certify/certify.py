@@ -1,7 +1,7 @@
 """Certify an optimal value: independent methods, and every condition that can be checked."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ocp import Solution, UnsupportedProblem, whole
 from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
@@ -58,10 +58,10 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
 
     Methods that share nothing but the problem are taken to the end, as far as they apply:
     indirect multiple shooting, refined collocation, direct multiple shooting extrapolated over
-    its grids; in discrete time the nonlinear program and a linear method. The two most accurate have to agree to 8 digits where no path constraint is
-    active, to 5 where one is. Then the referee's word on the trajectory, the Hamiltonian, the
-    second-order test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of
-    the optimum being the global one.
+    its grids; in discrete time the nonlinear program and a linear method. The first two have
+    to agree to 8 digits where an extremal is one of them, to 5 where not. Then the referee's
+    word on the trajectory, the Hamiltonian, the second-order test, the Karush-Kuhn-Tucker
+    conditions on a grid, and what can be said of the optimum being the global one.
 
     Args:
         solution: near the optimum that is to be certified; of any method.
@@ -81,12 +81,13 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     estimates, reasons = _estimates(solution, coarse)
     best = estimates[0]
     smooth = best.is_extremal
+    on_the_grid = grid_checks(coarse)
     checks = [
         _agreement(estimates, smooth, reasons),
         _feasibility(best, smooth),
-        hamiltonian_check(best.solution, _SMOOTH_DRIFT if smooth else _OTHER_DRIFT),
+        _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
-        *grid_checks(coarse),
+        *on_the_grid,
         convexity(solution.problem),
         other_starts(best, effort.starts, effort.seed, len(coarse.t) - 1),
         every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
@@ -134,6 +135,12 @@ def _feasibility(best: Estimate, smooth: bool) -> Check:
     limit = _SMOOTH_VIOLATION if smooth else _OTHER_VIOLATION
     said = f"the referee sees a violation of {best.violation:.1e}"
     return Check.at_most(FEASIBILITY, best.violation, limit, said)
+
+
+def _hamiltonian(best: Estimate, unique: bool) -> Check:
+    """Decisive where the costates are unique, which those of a direct method need not be."""
+    check = hamiltonian_check(best.solution, _SMOOTH_DRIFT if best.is_extremal else _OTHER_DRIFT)
+    return check if best.is_extremal or unique else replace(check, decisive=False)
 
 
 def _second_order(best: Estimate) -> Check:

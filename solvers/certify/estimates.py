@@ -1,5 +1,6 @@
 """What independent methods make of an optimal value, each with an error estimate of its own."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -127,7 +128,9 @@ def by_shooting(coarse: Solution) -> Estimate:
     """
     answer = coarse
     verdicts = [evaluate(answer, tolerance=TOLERANCE)]
-    while len(verdicts) < _GRIDS:
+    while len(verdicts) < _GRIDS or (
+        not is_steady([v.cost for v in verdicts]) and 2 * (len(answer.t) - 1) <= _MOST_INTERVALS
+    ):
         answer = _solved(MultipleShooting(2 * (len(answer.t) - 1)), answer)
         verdicts.append(evaluate(answer, tolerance=TOLERANCE))
     cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
@@ -150,7 +153,7 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
     """
     while True:
         try:
-            return _solved(MultipleShooting(intervals), solution)
+            return _solved(MultipleShooting(intervals, tolerance=_BARRIER), solution)
         except NoEstimateError:
             intervals *= 2
             if intervals > _MOST_INTERVALS:
@@ -163,17 +166,23 @@ def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
     Args:
         costs: (at least 4,), coarsest first.
     """
-    steps = np.diff(costs)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = steps[:-1] / steps[1:]
-    last = float(costs[-1])
-    if not all(_LEAST_RATIO <= r <= _MOST_RATIO for r in ratios[-2:]):
+    steps, last = np.diff(costs), float(costs[-1])
+    if not is_steady(costs):
         change = abs(float(steps[-1]))
         return last, change, "the change under the last doubling; no steady order"
+    ratios = steps[:-1] / steps[1:]
     limits = costs[2:] + steps[1:] / (ratios - 1.0)
     order = float(np.log2(ratios[-1]))
     error = abs(float(limits[-1] - limits[-2]))
     return float(limits[-1]), error, f"extrapolated with the observed order {order:.2f}"
+
+
+def is_steady(costs: Sequence[float] | np.ndarray) -> bool:
+    """Whether the last three changes of the cost shrink by ratios that an order explains."""
+    steps = np.diff(costs)[-3:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = steps[:-1] / steps[1:]
+    return bool(((ratios >= _LEAST_RATIO) & (ratios <= _MOST_RATIO)).all())
 
 
 def _solved(solver: MultipleShooting, guess: Solution) -> Solution:

@@ -11,7 +11,7 @@ from ocp import RK4, Solution, Transcription
 from solvers.certify.certificate import Check, Verdict
 
 # A bound this close, relative to 1 + abs(bound), is taken as active.
-_ACTIVE = 1e-6
+_ACTIVE = 1e-5
 # Singular values below this share of the largest count as zero.
 _DEPENDENT = 1e-9
 # Of the gradient of the Lagrangian and of multipliers of the wrong sign, relative to the
