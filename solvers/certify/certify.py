@@ -78,12 +78,16 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         coarse = on_grid(solution, effort.intervals)
     except NoEstimateError as reason:
         raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
-    estimates, reasons = _estimates(solution, coarse)
+    estimates, silent = _estimates(solution, coarse)
+    if not estimates:
+        why = " ".join(check.sentence for check in silent)
+        raise UnsupportedProblem(f"{solution.problem.name}: no method certifies it. {why}")
     best = estimates[0]
     smooth = best.is_extremal
     on_the_grid = grid_checks(coarse)
     checks = [
-        _agreement(estimates, smooth, reasons),
+        _agreement(estimates, smooth),
+        *silent,
         _feasibility(best, smooth),
         _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
@@ -95,36 +99,39 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
 
 
-def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], str]:
-    """What the methods say, an extremal first, then the most accurate, and why others say nothing.
+def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], list[Check]]:
+    """What the methods say, an extremal first, then the most accurate; and why others do not.
 
     Doubled grids of direct shooting are asked only where another method is missing: they are
     the least accurate.
     """
-    methods: tuple[Callable[[], Estimate], ...] = (
-        lambda: by_polish(solution),
-        lambda: by_collocation(coarse),
-        lambda: by_shooting(coarse),
-    )
+    methods: dict[str, Callable[[], Estimate]] = {
+        "polish": lambda: by_polish(solution),
+        "collocation": lambda: by_collocation(coarse),
+        "doubled grids": lambda: by_shooting(coarse),
+    }
     if solution.problem.model.is_discrete:
-        methods = (lambda: by_nonlinear_program(coarse), lambda: by_linear_method(coarse))
+        methods = {
+            "nonlinear program": lambda: by_nonlinear_program(coarse),
+            "linear method": lambda: by_linear_method(coarse),
+        }
     found: list[Estimate] = []
-    reasons: list[str] = []
-    for method in methods:
+    silent: list[Check] = []
+    for name, method in methods.items():
         if len(found) == _METHODS:
             break
         try:
             found.append(method())
         except NoEstimateError as reason:
-            reasons.append(str(reason))
+            silent.append(Check.skipped(name, str(reason)))
     found.sort(key=lambda estimate: (not estimate.is_extremal, estimate.error))
-    return found, " ".join(reasons)
+    return found, silent
 
 
-def _agreement(estimates: list[Estimate], smooth: bool, reasons: str) -> Check:
-    if len(estimates) < 2:
-        return Check(AGREEMENT, Verdict.FAILS, f"one method only. {reasons}")
-    first, second = estimates[:2]
+def _agreement(estimates: list[Estimate], smooth: bool) -> Check:
+    if len(estimates) < _METHODS:
+        return Check(AGREEMENT, Verdict.FAILS, "one method only")
+    first, second = estimates
     digits, asked = agreement(first.cost, second.cost), SMOOTH_DIGITS if smooth else OTHER_DIGITS
     said = f"{digits:.1f} digits between {first.method} and {second.method}; {asked} asked"
     verdict = Verdict.HOLDS if digits >= asked else Verdict.FAILS

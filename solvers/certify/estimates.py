@@ -16,7 +16,7 @@ from solvers.polish import polish
 # The referee integrates to this, relative.
 TOLERANCE = 1e-11
 # What a polished extremal of the problem without its path constraints may violate of them.
-_INACTIVE = 1e-9
+_INACTIVE = 1e-8
 # Relative change of the cost at which its steps are fine enough; where the second derivatives
 # of the problem jump (smoothness 1), an integrator gains little by more.
 _POLISHED, _POLISHED_ROUGH = 1e-10, 1e-9
@@ -57,9 +57,7 @@ def by_polish(solution: Solution) -> Estimate:
     polished = polished.with_(problem=ocp)
     verdict = evaluate(polished, tolerance=TOLERANCE)
     if verdict.violation > _INACTIVE:
-        raise NoEstimateError(
-            f"{verdict.worst} is violated by {verdict.violation:.1e}: it is active"
-        )
+        raise NoEstimateError(f"{verdict.worst} is violated by {verdict.violation:.1e} without it")
     error = max(abs(verdict.cost - polished.cost), verdict.cost_error, polished.residual)
     said = f"the referee's cost differs by {abs(verdict.cost - polished.cost):.1e}"
     return Estimate(

@@ -95,7 +95,7 @@ def _point(transcription: Transcription, solution: Solution) -> _Point:
     names = [
         _of_row(row.name, row.node) for row, on in zip(transcription.rows, in_g, strict=True) if on
     ]
-    names += [_of_unknown(transcription, i) for i in np.flatnonzero(in_w)]
+    names += [_of_unknown(transcription, int(i)) for i in np.flatnonzero(in_w)]
     return _Point(
         slope=slope.ravel(),
         rows=rows,
