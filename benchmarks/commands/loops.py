@@ -5,25 +5,32 @@ from argparse import ArgumentParser, Namespace
 from rich.console import Console
 
 from benchmarks.commands.command import Command
-from benchmarks.commands.options import add_out, positive
+from benchmarks.commands.options import add_out, positive, seconds
 from benchmarks.mpc.arm_loop import SOLVERS
-from benchmarks.mpc.commands import print_endings, print_faults, print_loops
-from benchmarks.mpc.dial import COMPARED, SCENARIOS
+from benchmarks.mpc.commands import SHORT, print_faults, print_loops
+from benchmarks.mpc.dial import COMPARED, HORIZONS, SCENARIOS
 
 
 def _mpc_options(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ..."
-    )
+    parser.add_argument("--scenarios", nargs="+", default=(), metavar="S", help="arm-001 ...")
     parser.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
-    parser.add_argument("--short", action="store_true", help="terminal costs, delay, the mass")
+    parser.add_argument(
+        "--horizons", nargs="+", default=(), type=seconds, metavar="T", help="in seconds"
+    )
+    parser.add_argument(
+        "--short", nargs="*", choices=tuple(SHORT), help="these instead of the dial; none: all"
+    )
     add_out(parser)
 
 
 def _mpc(options: Namespace, console: Console) -> int:
-    if options.short:
-        return print_endings(console)
-    return print_loops(console, options.out, options.scenarios, options.controllers)
+    scenarios, horizons = options.scenarios, options.horizons
+    if options.short is None:
+        scenarios, horizons = scenarios or SCENARIOS, horizons or HORIZONS
+        return print_loops(console, options.out, scenarios, options.controllers, horizons)
+    for name in options.short or SHORT:
+        SHORT[name](console, scenarios, horizons)
+    return 0
 
 
 def _faults_options(parser: ArgumentParser) -> None:
