@@ -108,6 +108,11 @@ def cart_pole_swing_up(
 
     The defaults are the problem of [Kelly 2017], section 6 and appendix E.1.
 
+    Reference optimum: 58.807667458, by ``polish`` to 1e-10, without the track: no bound is
+    active, |u| <= 14.0 N and p <= 1.18 m. Multiple shooting holds its forces and costs
+    59.132, 58.888, 58.828 and 58.813 on 50, 100, 200 and 400 intervals, which extrapolates
+    to 58.807667.
+
     Args:
         system: masses and length; default: those of Kelly.
         distance: d [m].
@@ -129,7 +134,7 @@ def cart_pole_swing_up(
         control_bounds=_within(force, "force"),
         state_bounds=_on(track, distance),
         constraints=(Constraint("end", model.x, end, end, at="terminal"),),
-        guess=Guess(x=[np.zeros(4), end], u=[0.0]),
+        guess=Guess(x=np.array([np.zeros(4), end]), u=[0.0]),
     )
 
 
@@ -154,10 +159,11 @@ def cart_pole_upright(
 
     with x̃ = x - (d, π, 0, 0), Q and S diagonal, and w = 5e4. No end is prescribed.
 
-    Where the track alone is a bound, an optimal cart runs along it, and the smallest error of
-    the model then leaves it no way back: no force stops it at once. The cushion of width c at
-    either end keeps it away at a price, which also serves solvers that take no state bounds.
-    Its second derivative jumps, so that the smoothness is 1.
+    Where the track is a hard bound, an optimal cart runs along it, and the smallest error of
+    the model then leaves it no way back: no force stops it at once. With a cushion the price
+    w alone keeps the cart away, which also serves solvers that take no state bounds:
+    |p| <= p_max is then no bound of the problem any more. The second derivative jumps, so
+    that the smoothness is 1.
 
     Args:
         system: masses and length; default: those of ``CartPole``.
@@ -171,13 +177,19 @@ def cart_pole_upright(
         effort: r.
 
     Raises:
-        ProblemError: if a bound or weight is negative, or the target lies beyond the track.
+        ProblemError: if a bound or weight is negative, or the target lies beyond the track or
+            in its cushion.
     """
     model = (system or CartPole()).model()
     off = model.x - ca.DM([distance, np.pi, 0.0, 0.0])
     q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
     r = at_least(effort, 0.0, "cart-pole: effort", strictly=True)
     soft, on_track = at_least(cushion, 0.0, "cart-pole: cushion"), _on(track, distance)
+    if soft and not abs(distance) <= track - soft < np.inf:
+        raise ProblemError(
+            f"cart-pole: with a cushion of {soft} m the track of {track} m must be finite, and "
+            f"leave distance = {distance} m free"
+        )
     beyond = ca.fmax(0.0, ca.fabs(model.x[0]) - (track - soft)) if soft else ca.SX(0.0)
     return OCP(
         name="cart-pole upright",

@@ -4,15 +4,20 @@ from argparse import ArgumentParser, Namespace
 
 from rich.console import Console
 
+from benchmarks.cases import arm_cases
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import add_out, positive, seconds
 from benchmarks.mpc.arm_loop import SOLVERS
 from benchmarks.mpc.commands import SHORT, print_faults, print_loops
 from benchmarks.mpc.dial import COMPARED, HORIZONS, SCENARIOS
+from ocp import ProblemError
 
 
 def _mpc_options(parser: ArgumentParser) -> None:
-    parser.add_argument("--scenarios", nargs="+", default=(), metavar="S", help="arm-001 ...")
+    arms = [c.name.removesuffix("-sum") for c in arm_cases() if c.name.endswith("-sum")]
+    parser.add_argument(
+        "--scenarios", nargs="+", default=(), choices=arms, metavar="S", help="arm-001 ..."
+    )
     parser.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
     parser.add_argument(
         "--horizons", nargs="+", default=(), type=seconds, metavar="T", help="in seconds"
@@ -24,6 +29,14 @@ def _mpc_options(parser: ArgumentParser) -> None:
 
 
 def _mpc(options: Namespace, console: Console) -> int:
+    try:
+        return _chosen(options, console)
+    except ProblemError as error:  # a horizon that is shorter than the sampling interval
+        console.print(str(error), markup=False)
+        return 2
+
+
+def _chosen(options: Namespace, console: Console) -> int:
     scenarios, horizons = options.scenarios, options.horizons
     if options.short is None:
         scenarios, horizons = scenarios or SCENARIOS, horizons or HORIZONS
