@@ -79,7 +79,7 @@ def loop(setting: Setting, *, seed: int = 1) -> Rollout:
 
     Indirect solvers and descent get their first guess from the direct solution, as on the arm.
     """
-    ocp, intervals = problem(setting.horizon), round(setting.horizon / DT)
+    ocp, intervals = problem(setting.horizon), max(1, round(setting.horizon / DT))
     direct = setting.solver in ("ipopt", "fatrop")
     mpc = MPC(
         ocp=ocp,
