@@ -50,8 +50,8 @@ def swing_up() -> Drawing:
         positions.axhspan(side * (TRACK - CUSHION), side * TRACK, color="tab:red", alpha=0.12)
     for axes, what in ((positions, "position [m]"), (angles, "angle [rad]"), (forces, "force [N]")):
         label(axes, "time [s]" if axes is forces else "", what)
-    angles.set_yticks([-np.pi, 0.0, np.pi], ["-π", "0", "π"])
-    positions.legend(fontsize=8, loc="upper right")
+    angles.set_yticks([0.0, np.pi], ["0", "π"])
+    positions.legend(fontsize=8, loc="lower right")
     _motion(picture.add_subplot(grid[:, 1]), runs[_DRAWN])
     return Drawing(picture, columns, _sentence(runs))
 

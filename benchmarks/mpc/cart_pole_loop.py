@@ -1,10 +1,11 @@
 """The cart-pole in closed loop: from hanging to standing, with little force and a short track.
 
-|force| <= 12 N and |position| <= 0.6 m: the pole cannot be lifted in one go, and the cart has
-to turn before the end of the track. The plant has the hard track and judges by it. What the
-controllers solve has a cushion of 0.1 m instead, for two reasons. An optimal cart runs along a hard
-bound, from where the smallest error of the model leads beyond it, and then no plan is feasible.
-And solvers that take no state bounds can so solve the same problem as the direct ones.
+|force| <= 12 N and |position| <= 0.6 m: the force is at its bound from the first step, and the cart
+has to turn before the end of the track. The plant has the hard track and judges by it. What
+the controllers solve has a cushion of 0.1 m instead, for two reasons. Where a hard track binds
+(at 0.5 m it does), an optimal cart runs along it, the smallest error of the integrator leads
+beyond it, and then no plan is feasible. And solvers that take no state bounds can so solve the
+same problem as the direct ones.
 """
 
 from collections.abc import Callable, Sequence
