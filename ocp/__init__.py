@@ -23,7 +23,8 @@ from ocp.mpc.driver import MPC
 from ocp.mpc.law import Law
 from ocp.mpc.loop import closed_loop
 from ocp.mpc.plant import Plant
-from ocp.mpc.recorder import FlightRecorder, Record, Replay, records, replay, replay_all
+from ocp.mpc.record import Record, records
+from ocp.mpc.recorder import FlightRecorder, Replay, replay, replay_all
 from ocp.mpc.rollout import Rollout
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal

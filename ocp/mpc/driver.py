@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from ocp.errors import ProblemError, UnsupportedProblem
 from ocp.expressions import instance
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE, Rule
-from ocp.mpc.decision import ControlRefused, Decision
+from ocp.mpc.decision import Attempt, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.ladder import Ladder, Moment
 from ocp.mpc.loop import Watch, closed_loop
@@ -174,18 +175,31 @@ class MPC:
         if late:
             moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
         new = ladder.new(moment, plan) if plan is not None and not late else None
-        decision = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
-        if decision is None:
-            raise ControlRefused(f"t = {t:g} s: {'; '.join(moment.reasons)}")
+        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
         good = plan if late or new is not None else None
-        self.memory = self.memory.after(decision.input, good, self.steps_late)
-        return replace(
-            decision,
-            status=status,
-            message="; ".join(moment.reasons),
-            residual=plan.residual if plan else np.inf,
-            late=late,
-            time_used=perf_counter() - started,
+        self.memory = self.memory.after(choice and choice.input, good, self.steps_late)
+        common: dict[str, Any] = {
+            "t": moment.t,
+            "applies_at": moment.at,
+            "status": status,
+            "message": "; ".join(moment.reasons),
+            "residual": plan.residual if plan else np.inf,
+            "late": late,
+            "parameters": moment.values.as_dict() if moment.is_informed else {},
+            "is_informed": moment.is_informed,
+            "time_used": perf_counter() - started,
+        }
+        if choice is None:
+            said = f"t = {t:g} s: {common['message']}"
+            raise ControlRefused(said, Attempt(**common))
+        followed = choice.plan
+        return Decision(
+            **common,
+            input=choice.input,
+            outcome=choice.outcome,
+            plan=followed,
+            age=round((moment.at - followed.t[0]) / self.dt) if followed else 0,
+            clipped=choice.clipped,
         )
 
     def run(
@@ -226,7 +240,7 @@ class MPC:
         is_measured = bool(np.isfinite(state).all())
         if not is_measured:  # without a plan the backup law sees what was measured
             state = state if plan is None else plan.state(at)
-        elif self.compensate:
+        elif self.compensate and self.memory.pending:
             state = self._predicted(state, t, values.at((at - since) / self.ocp.duration)[0])
         return Moment(
             t=float(t),

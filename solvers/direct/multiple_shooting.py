@@ -124,7 +124,7 @@ class MultipleShootingProgram(Program):
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started = perf_counter()
         ocp, tr = self.transcription.ocp, self.transcription
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         bounds, p = tr.bounds(data), tr.data_vector(data)
         z, u = self._first_iterate(data, guess or ocp.guess)
         w0 = np.clip(tr.join(z, u), bounds["lbx"], bounds["ubx"])

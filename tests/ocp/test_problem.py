@@ -191,7 +191,7 @@ def test_a_guess_of_the_duration_is_positive(duration: float) -> None:
 def test_data_refuses_an_initial_time_that_is_not_finite(t0: float) -> None:
     ocp = integrator()
     with pytest.raises(ProblemError, match=re.escape(f"t0 = {t0}")):
-        Data(ocp.start(), t0, ocp.parameter_values())
+        Data.of(ocp, t0=t0)
 
 
 def test_a_guess_is_sampled_at_any_instants() -> None:
