@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import isfinite
 from time import perf_counter
 from typing import Any
 
@@ -21,7 +22,9 @@ from ocp.mpc.plant import Plant
 from ocp.mpc.rollout import Rollout
 from ocp.parameters import ParameterValues
 from ocp.problem import OCP
+from ocp.solution import Solution
 from ocp.solver import Solver, Start
+from ocp.status import Status
 
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
 
@@ -178,23 +181,12 @@ class MPC:
         choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
         good = plan if late or new is not None else None
         self.memory = self.memory.after(choice and choice.input, good, self.steps_late)
-        common: dict[str, Any] = {
-            "t": moment.t,
-            "applies_at": moment.at,
-            "status": status,
-            "message": "; ".join(moment.reasons),
-            "residual": plan.residual if plan else np.inf,
-            "late": late,
-            "parameters": moment.values.as_dict() if moment.is_informed else {},
-            "is_informed": moment.is_informed,
-            "time_used": perf_counter() - started,
-        }
+        said = _account(moment, plan, status, late, perf_counter() - started)
         if choice is None:
-            said = f"t = {t:g} s: {common['message']}"
-            raise ControlRefused(said, Attempt(**common))
+            raise ControlRefused(f"t = {t:g} s: {said['message']}", Attempt(**said))
         followed = choice.plan
         return Decision(
-            **common,
+            **said,
             input=choice.input,
             outcome=choice.outcome,
             plan=followed,
@@ -230,7 +222,7 @@ class MPC:
     def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
         """Collect what a decision is made from."""
         state, plan, at = np.array(x, dtype=float), self.memory.plan, t + self.delay
-        if state.shape != (self.ocp.model.nx,) or not np.isfinite(t):
+        if state.shape != (self.ocp.model.nx,) or not isfinite(t):
             raise ProblemError(
                 f"MPC of {self.ocp.name}: x has shape {state.shape} at t = {t}; "
                 f"({self.ocp.model.nx},) and a finite time are needed"
@@ -274,3 +266,20 @@ class MPC:
         for k, given in enumerate(self.memory.pending):
             x = self._ladder.advanced(x, given, t + k * self.dt, p)
         return x
+
+
+def _account(
+    moment: Moment, plan: Solution | None, status: Status | None, late: bool, used: float
+) -> dict[str, Any]:
+    """Return what is said of a step whatever came of it, by the names of ``Attempt``."""
+    return {
+        "t": moment.t,
+        "applies_at": moment.at,
+        "status": status,
+        "message": "; ".join(moment.reasons),
+        "residual": plan.residual if plan else np.inf,
+        "late": late,
+        "parameters": moment.values.as_dict() if moment.is_informed else {},
+        "is_informed": moment.is_informed,
+        "time_used": used,
+    }

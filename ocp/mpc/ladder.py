@@ -31,6 +31,7 @@ _USABLE = frozenset(
 )
 # Of an instant, relative to the interval: later than the end by less is the end.
 _ROUNDING = 1e-6
+_NO_PARAMETERS = np.empty(0)
 
 
 class Moment(NamedTuple):
@@ -221,6 +222,8 @@ class Ladder:
 
     def _now(self, moment: Moment) -> np.ndarray:
         """Return the parameters when the input acts (n_p,)."""
+        if not self.ocp.parameters:
+            return _NO_PARAMETERS
         return moment.values.at((moment.at - moment.since) / self.ocp.duration)[0]
 
     def _rehearsal(self, n: int) -> Rehearsal:

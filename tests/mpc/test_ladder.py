@@ -146,6 +146,19 @@ def test_late_answers_are_kept_for_later() -> None:
         slow.step([1.0, 0.0], 0.0)
 
 
+def test_a_late_plan_outlives_the_refusal_of_its_step() -> None:
+    mpc = controller()
+    with pytest.raises(ControlRefused, match="too late") as refused:
+        mpc.step([1.0, 0.0], 0.0, late=True)
+    attempt = refused.value.attempt
+    assert attempt is not None
+    assert attempt.late
+    assert attempt.status is Status.SOLVED
+    decision = mpc.step([np.nan, 0.0], DT)
+    assert decision.outcome is Outcome.SHIFTED, "the late plan is the last one"
+    assert decision.age == 1
+
+
 faults = st.sampled_from(
     [
         raises(RuntimeError("no")),
