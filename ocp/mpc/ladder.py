@@ -27,6 +27,8 @@ _USABLE = frozenset(
         Status.COST_ROSE,
         Status.ITERATION_LIMIT,
         Status.NO_PROGRESS,
+        # A measured state may violate what from the next node on can be met.
+        Status.INFEASIBLE,
     }
 )
 # Of an instant, relative to the interval: later than the end by less is the end.
@@ -177,20 +179,27 @@ class Ladder:
                 return 0.0, ""
             u, ends = plan.u[: len(plan.t) - 1], self._ends(moment, plan.t)
             return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
-        if plan.status in _USABLE:
-            return self._rehearsed(plan, moment)
-        return np.inf, plan.status.value
+        if plan.status not in _USABLE:
+            return np.inf, plan.status.value
+        return self._rehearsed(plan, moment)
 
     def _rehearsed(self, plan: Solution, moment: Moment) -> tuple[float, str]:
-        """Run the model from now under what is left of a plan, and check the constraints."""
+        """Run the model from now under what is left of a plan, and check the constraints.
+
+        Those of the end are asked of a whole plan only: a remainder ends before its horizon.
+        """
         times = moment.at + plan.t - plan.t[0]
         left = int((times[:-1] < plan.t[-1] - _ROUNDING * self.dt).sum())
         if not left:
             return np.inf, "nothing is left of it"
         times = times[: left + 1]
-        u = controls(plan, times[:-1])
-        trial = self._rehearsal(left).of(moment.start, u, times, self._ends(moment, times))
-        return trial.excess, trial.worst
+        u, rehearsal = controls(plan, times[:-1]), self._rehearsal(left)
+        trial = rehearsal.of(moment.start, u, times, self._ends(moment, times))
+        found = trial.excess, trial.worst
+        if left < len(plan.t) - 1 or not isfinite(trial.excess):
+            return found
+        p = self._parameters(moment, times[-1])
+        return max(found, rehearsal.end_excess(trial.x[-1], times[-1], p))
 
     def _following(self, plan: Solution, moment: Moment, outcome: Outcome) -> Choice | None:
         """Follow a plan now; None where its input is none."""
@@ -198,7 +207,9 @@ class Ladder:
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
         u = controls(plan, moment.at + middle)
-        given = self.applied.of(self.ocp, moment.start, u, moment.at, self._now(moment))
+        given = self.applied.of(
+            self.ocp, moment.start, u, moment.at, self._parameters(moment, moment.at)
+        )
         return self._within(moment, given, outcome, plan)
 
     def _within(
@@ -220,11 +231,11 @@ class Ladder:
         """Return the parameters at both ends of the intervals between some instants (N + 1,)."""
         return moment.values.on((times - moment.since) / self.ocp.duration)
 
-    def _now(self, moment: Moment) -> np.ndarray:
-        """Return the parameters when the input acts (n_p,)."""
+    def _parameters(self, moment: Moment, t: float) -> np.ndarray:
+        """Return the parameters at an instant (n_p,)."""
         if not self.ocp.parameters:
             return _NO_PARAMETERS
-        return moment.values.at((moment.at - moment.since) / self.ocp.duration)[0]
+        return moment.values.at((t - moment.since) / self.ocp.duration)[0]
 
     def _rehearsal(self, n: int) -> Rehearsal:
         """Roll-outs over n intervals, prepared once for each n."""
