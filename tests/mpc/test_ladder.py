@@ -20,7 +20,7 @@ from ocp import (
     Status,
 )
 from solvers import MultipleShooting
-from tests.mpc.problems import FASTEST, LIMIT, Change, Scripted, cart, is_an_input
+from tests.mpc.problems import FASTEST, LIMIT, Change, cart, is_an_input, scripted
 
 DT = 0.1
 
@@ -41,7 +41,7 @@ def leaves_bounds(by: float) -> Change:
 
 
 def controller(script: dict[float, Change] | None = None, **options) -> MPC:
-    return MPC(ocp=cart(), solver=Scripted(script or {}), dt=DT, **options)
+    return MPC(ocp=cart(), solver=scripted(script or {}), dt=DT, **options)
 
 
 def loop(mpc: MPC, duration: float = 1.0):
@@ -246,7 +246,7 @@ def test_whatever_fails_no_input_is_out_of_bounds(script, sensors) -> None:
 SCRIPT: dict[float, Change] = {}
 SHARED = MPC(
     ocp=cart(),
-    solver=Scripted(SCRIPT),
+    solver=scripted(SCRIPT),
     dt=DT,
     backup=lambda x, t: [-3.0 * x[0] - 3.0 * x[1]],
 )

@@ -30,7 +30,7 @@ from ocp import (
     solve,
 )
 from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
-from tests.mpc.problems import Scripted, cart
+from tests.mpc.problems import cart, scripted
 
 DT = 0.1
 START = [1.0, 0.0]
@@ -182,7 +182,7 @@ def unconstrained_named():
 
 def test_a_rollout_is_drawn(tmp_path: Path) -> None:
     script = {0.2: lambda s: s.with_(u=s.u + 9.0)}
-    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT)
+    mpc = MPC(ocp=cart(), solver=scripted(script), dt=DT)
     figure = mpc.run(Plant(ocp=cart()), START, 0.5).plot()
     assert "1 shifted" in figure.get_suptitle()
     figure.savefig(tmp_path / "loop.png")
@@ -191,7 +191,7 @@ def test_a_rollout_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize("delay", [0.0, DT])
 def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: float) -> None:
     script = {round(t + delay, 2): lambda s: s.with_(u=s.u + 9.0) for t in (0.2, 0.3)}
-    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT, delay=delay, backup=lambda x, t: [-x[0]])
+    mpc = MPC(ocp=cart(), solver=scripted(script), dt=DT, delay=delay, backup=lambda x, t: [-x[0]])
     plant = Plant(ocp=cart(mass=1.2), measurement_noise=0.01)
     file = tmp_path / "flight"
     with FlightRecorder(mpc, file) as recorder:
@@ -210,7 +210,7 @@ def test_a_refusal_is_recorded_and_refused_again(tmp_path: Path) -> None:
     def fails(solution: Solution) -> Solution:
         return solution.with_(status=Status.FAILED, message="as the script says")
 
-    mpc, file = MPC(ocp=cart(), solver=Scripted({0.1: fails}), dt=DT), tmp_path / "flight"
+    mpc, file = MPC(ocp=cart(), solver=scripted({0.1: fails}), dt=DT), tmp_path / "flight"
     with FlightRecorder(mpc, file) as recorder:
         # A late plan outlives its own step, in the replay too: the third step follows it.
         for k, (x, late) in enumerate([([1.0, 0.0], True), ([np.nan, 0.0], False), (START, True)]):
@@ -232,7 +232,7 @@ def mpc_step(mpc: MPC, recorder: FlightRecorder, x: np.ndarray, t: float, late: 
 
 def test_a_loop_records_the_refusal_that_ends_it(tmp_path: Path) -> None:
     fails = {0.3: lambda s: s.with_(status=Status.FAILED, message="as the script says")}
-    mpc = MPC(ocp=cart(), solver=Scripted(fails), dt=DT, backup=lambda x, t: [np.nan])
+    mpc = MPC(ocp=cart(), solver=scripted(fails), dt=DT, backup=lambda x, t: [np.nan])
     jumps = Plant(ocp=cart(), disturbance=lambda t: [80.0 if 0.2 <= t < 0.29 else 0.0])
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(jumps, START, 1.0, watch=recorder.watch)

@@ -205,7 +205,7 @@ def test_a_guess_is_sampled_at_any_instants() -> None:
 def test_a_declared_start_lies_within_its_bounds() -> None:
     bounds = Box(-1.0, 0.3)
     assert integrator(x0=0.3 + 1e-12, state_bounds=bounds).start()[0] == 0.3 + 1e-12
-    with pytest.raises(ProblemError, match=r"x0\[0\] .* = 0.300001 is outside its bounds"):
+    with pytest.raises(ProblemError, match=r"x0\[0\] .* is outside its bounds"):
         integrator(x0=0.3 + 1e-6, state_bounds=bounds)
 
 
