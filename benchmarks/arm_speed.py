@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from models import random_scenarios
 from ocp import MPC, OCP, Applied, FlightRecorder, Outcome, Program, Solution, Solver, Start, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz
+from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
 INTERVALS = (10, 20, 35, 50, 100, 200)
 LINKS = (3, 4, 6)
@@ -74,6 +74,7 @@ def contenders(intervals: int = N) -> dict[str, Solver]:
     return {
         "direct, ipopt": MultipleShooting(intervals),
         "direct, fatrop": MultipleShooting(intervals, backend="fatrop"),
+        "stagewise Newton": StagewiseNewton(intervals),
         "indirect": IndirectShooting(segments=5, steps=intervals),
         "gradient": Schuetz.sound(intervals=intervals),
     }

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from ocp.integrate import Integrator, interpolate
+from ocp.integrate import Integrator
 from ocp.problem import OCP
 
 
@@ -112,8 +112,9 @@ class _Tape:
         for k, (reach, weight) in enumerate(integrator.slopes):
             x = self.x + reach * slope[: self.nx] if k else self.x
             along = self.along + reach * rise[: self.nx, :] if k else self.along
-            visit, slope, rise = self._visit(x, along, (i + reach) / integrator.steps, h)
-            visits.append(_Visit(*visit, reach, weight, h))
+            place = (x, along, (i + reach) / integrator.steps, h)
+            visit, slope, rise = self._visit(*place, reach=reach, weight=weight)
+            visits.append(visit)
             moves = slope[: self.nx], rise[: self.nx, :], slope[self.nx], rise[self.nx, :]
             ends = [end + weight * move for end, move in zip(ends, moves, strict=True)]
         self.x, self.along, self.cost, self.gradient = ends
@@ -122,19 +123,24 @@ class _Tape:
     def step_discretely(self) -> None:
         """Take the one step of a discrete-time model, whose slope is the next state itself."""
         one = ca.MX(1)
-        visit, slope, rise = self._visit(self.x, self.along, 0.0, one)
-        self.substeps.append([_Visit(*visit, 0.0, 1.0, one)])
+        place = (self.x, self.along, 0.0, one)
+        visit, slope, rise = self._visit(*place, reach=0.0, weight=1.0)
+        self.substeps.append([visit])
         self.x, self.along = slope[: self.nx], rise[: self.nx, :]
         self.cost, self.gradient = slope[self.nx], rise[self.nx, :]
 
-    def _visit(self, x: ca.MX, along: ca.MX, fraction: float, h: ca.MX) -> tuple:
-        """Return where and on what a slope depends; h times the slope; d(that)/dw."""
+    def _visit(
+        self, x: ca.MX, along: ca.MX, fraction: float, h: ca.MX, *, reach: float, weight: float
+    ) -> tuple[_Visit, ca.MX, ca.MX]:
+        """Return a slope's place, h times the slope, and d(that)/dw."""
         g = self.given
-        at = (x, g["u"], g["t"] + fraction * g["h"], interpolate(g["p0"], g["p1"], fraction))
-        slope, jacobian = self.slope.first(*at)
+        p = g["p0"] + fraction * (g["p1"] - g["p0"])
+        at = (x, g["u"], g["t"] + fraction * g["h"], p)
+        slope, jacobian = self.slope.first.call(list(at))
         jacobian = h * jacobian
         from_u = ca.horzcat(ca.MX.zeros(self.nx + 1, self.nx), jacobian[:, self.nx :])
-        return (at, jacobian, along), h * slope, jacobian[:, : self.nx] @ along + from_u
+        rise = jacobian[:, : self.nx] @ along + from_u
+        return _Visit(at, jacobian, along, reach, weight, h), h * slope, rise
 
     def outputs(self) -> list[ca.MX]:
         """Return state, cost, Jacobian, slope and Hessian, the last by going backwards."""

@@ -1,6 +1,7 @@
 """The intervals of a direct method: their data, where to start, and how accurate they are."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class Intervals:
         step, halved = map(compiled, steps) if fast else steps
         return cls(ocp, n, Buffered(step.mapaccum(n)), Buffered(halved.map(n)))
 
-    @property
+    @cached_property
     def fractions(self) -> np.ndarray:
         """Nodes as fractions of the horizon, (N + 1,)."""
         return np.linspace(0.0, 1.0, self.n + 1)

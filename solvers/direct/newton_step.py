@@ -106,8 +106,9 @@ class NewtonStep:
                 controls alone, which is positive definite if and only if every Q_uu is.
             schedule: t, h, p0, p1 of all stages, and the parameters at the end.
         """
-        *arrays, numbers = self.function(at.x, at.u, at.costate, sigma, *schedule)
-        return View(*arrays, *numbers[:, 0].tolist())
+        results = self.function(at.x, at.u, at.costate, sigma, *schedule)
+        dx, du, dcostate, pivots, numbers = results
+        return View(dx, du, dcostate, pivots, *numbers.ravel().tolist())
 
 
 def _function(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Function:

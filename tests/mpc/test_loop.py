@@ -25,7 +25,15 @@ from ocp import (
     replay,
     solve,
 )
-from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
+from solvers import (
+    Greedy,
+    IndirectShooting,
+    LinearMPC,
+    MultipleShooting,
+    Riccati,
+    Schuetz,
+    StagewiseNewton,
+)
 from tests.mpc.problems import Scripted, cart
 
 DT = 0.1
@@ -41,7 +49,13 @@ def driver(**options) -> MPC:
 
 @pytest.mark.parametrize(
     "solver",
-    [MultipleShooting(20), Schuetz.sound(intervals=20), IndirectShooting(), Greedy(intervals=20)],
+    [
+        MultipleShooting(20),
+        StagewiseNewton(20),
+        Schuetz.sound(intervals=20),
+        IndirectShooting(),
+        Greedy(intervals=20),
+    ],
     ids=lambda solver: type(solver).__name__,
 )
 def test_continuous_solvers_run_in_the_loop(solver) -> None:
@@ -55,7 +69,9 @@ def test_continuous_solvers_run_in_the_loop(solver) -> None:
 
 
 @pytest.mark.parametrize(
-    "solver", [LinearMPC(), LinearMPC(form="condensed"), Riccati(), MultipleShooting()], ids=repr
+    "solver",
+    [LinearMPC(), LinearMPC(form="condensed"), Riccati(), MultipleShooting(), StagewiseNewton()],
+    ids=repr,
 )
 def test_linear_solvers_run_in_the_loop(solver) -> None:
     ocp = discretise(unconstrained(), dt=0.05)
