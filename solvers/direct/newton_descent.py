@@ -11,15 +11,12 @@ from solvers.direct.newton_step import Iterate, NewtonStep, View
 _ARMIJO = 1e-4
 # Share of the merit function's slope that the gaps alone must account for [ibid., 18.36].
 _GAPS = 0.1
-# A full Newton step may also be taken if it leaves this share of the smallest residual so far:
-# the merit function alone refuses good steps near the end (Maratos).
-_HALF = 0.5
 # Shortest share of a step; then the shift grows.
-_SHORTEST = 1e-3
+_SHORTEST = 0.1
 # Shift of H_uu relative to its size: the first one, its growth, the largest.
 _SHIFT, _GROWTH, _MOST = 1e-4, 10.0, 1e12
 # Decreases below this, relative to 1 + abs(m), are rounding.
-_ROUNDING = 1e-14
+_ROUNDING = 1e-13
 # How far a stationary point that is no minimum is left behind, relative to 1 + abs(u).
 _KICK = 1e-3
 # Beyond this nothing is a trajectory any more.
@@ -32,7 +29,9 @@ class Descent:
 
     .. math:: m(x, u) = J(x, u) + \mu \sum_k \lVert c_k \rVert_1
 
-    A step is computed with the exact second derivative. Where a Q_uu is not positive definite
+    A step is computed with the exact second derivative, and its law followed by the model itself
+    (``NewtonStep.moved``): the first full step closes all gaps, and from then on the merit is the
+    cost. Where a Q_uu is not positive definite
     the shift sigma grows until all of them are, so that the step leads downhill; where no share
     of a step is accepted it grows as well. The end is judged without it: it is a minimum only
     if all Q_uu are positive definite there (the second-order condition of the discretised
@@ -56,7 +55,7 @@ class Descent:
         self.views, self.message = 0, ""
         self.costs: list[float] = []
         self.residuals: list[float] = []
-        self._penalty, self._smallest, self._kicked = 0.0, np.inf, False
+        self._penalty, self._kicked = 0.0, False
 
     def descend(self, start: Iterate) -> Status:
         """Iterate from a start; ``here`` and ``view`` are the iterate and what it is worth."""
@@ -84,15 +83,19 @@ class Descent:
         view, sigma = self.view, 0.0
         first = _SHIFT * (view.size or 1.0)
         while sigma <= _MOST * first:
-            if view.is_convex and self._search(view, sigma):
+            if view.is_convex and self._search(view):
                 return True
             sigma = _GROWTH * sigma or first
             view = self._look(self.here, sigma)
         return False
 
-    def _search(self, view: View, sigma: float) -> bool:
+    def _search(self, view: View) -> bool:
         """Move by the largest share 1, 1/2, 1/4 ... of the step that is accepted."""
         slope = view.cost_slope
+        # Below the largest costate the penalty is not exact; above it nothing is gained
+        # [Powell 1978].
+        enough = view.next_costate
+        self._penalty = max(enough, (self._penalty + enough) / 2.0)
         if view.gaps > 0.0:
             needed = (slope + max(view.bend, 0.0) / 2.0) / ((1.0 - _GAPS) * view.gaps)
             self._penalty = max(self._penalty, needed)
@@ -100,14 +103,10 @@ class Descent:
         before = view.cost + self._penalty * view.gaps
         slack, share = _ROUNDING * (1.0 + abs(before)), 1.0
         while share >= _SHORTEST:
-            there = self.here.moved(view, share)
+            there = self.step.moved(self.here, view, share, self.schedule)
             trial = self._look(there)
             merit = trial.cost + self._penalty * trial.gaps
-            is_newton = share == 1.0 and sigma == 0.0
-            if trial.is_finite and (
-                merit <= before + _ARMIJO * share * slope + slack
-                or (is_newton and trial.residual <= _HALF * self._smallest)
-            ):
+            if trial.is_finite and merit <= before + _ARMIJO * share * slope + slack:
                 self._stand_at(there, trial)
                 return True
             share /= 2.0
@@ -119,7 +118,6 @@ class Descent:
 
     def _stand_at(self, here: Iterate, view: View) -> None:
         self.here, self.view = here, view
-        self._smallest = min(self._smallest, view.residual)
         self.costs.append(view.cost)
         self.residuals.append(view.residual)
 
@@ -135,7 +133,7 @@ class Descent:
         view = self._look(there)
         if not view.is_finite:
             return False
-        self._kicked, self._smallest = True, np.inf
+        self._kicked = True
         self._stand_at(there, view)
         return True
 

@@ -6,8 +6,8 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Buffered, Integrator, compiled, curvature
-from solvers.direct.riccati_sweep import backwards, forwards
+from ocp import OCP, Buffered, Integrator, Stage, compiled, curvature
+from solvers.direct.riccati_sweep import backwards, follow, forwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,12 +17,6 @@ class Iterate:
     x: np.ndarray
     u: np.ndarray
     costate: np.ndarray
-
-    def moved(self, view: "View", share: float) -> "Iterate":
-        """Return the iterate after a share of a Newton step."""
-        return Iterate(
-            self.x + share * view.dx, self.u + share * view.du, self.costate + share * view.dcostate
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,29 +28,29 @@ class View:
     .. math:: \sum_k l(x_k, u_k) + p_{k+1}' c_k + \varphi(x_N) - p_0' x_0.
 
     Attributes:
-        dx: step of the states (nx, N + 1).
-        du: of the controls (nu, N).
-        dcostate: of the costates (nx, N + 1).
+        law: for every stage (2 nx + nu, nx + 1), see ``backwards``, side by side.
+        gap_by_stage: c (nx, N).
         pivots: of every Q_uu, relative to its diagonal, (nu, N).
         cost: the sum of the stages' costs and the final one.
         gaps: sum of abs(c).
         gap: norm of c.
         slope: norm of the Lagrangian's slopes in states and controls.
         largest_costate: largest abs(p).
+        next_costate: largest abs(p) after the step.
         cost_slope: slope of the cost along the step.
         bend: second derivative of the (shifted) Lagrangian along the step.
         size: largest row sum of H_uu and H_ux, to measure a shift by.
     """
 
-    dx: np.ndarray
-    du: np.ndarray
-    dcostate: np.ndarray
+    law: np.ndarray
+    gap_by_stage: np.ndarray
     pivots: np.ndarray
     cost: float
     gaps: float
     gap: float
     slope: float
     largest_costate: float
+    next_costate: float
     cost_slope: float
     bend: float
     size: float
@@ -66,8 +60,13 @@ class View:
 
     @property
     def residual(self) -> float:
-        """The gaps, or the slopes relative to 1 + abs(p), whichever is larger."""
-        return max(self.gap, self.slope / (1.0 + self.largest_costate))
+        """The gaps, or the slopes relative to 1 + abs(p), whichever is larger.
+
+        A gap c changes the cost by p'c: where that, relative to 1 + abs(cost), is more than the
+        gap itself, it counts.
+        """
+        worth = self.largest_costate / (1.0 + abs(self.cost))
+        return max(self.gap * max(1.0, worth), self.slope / (1.0 + self.largest_costate))
 
     @property
     def is_finite(self) -> bool:
@@ -82,19 +81,23 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class NewtonStep:
-    """The function of a problem on N intervals.
+    """The Newton step of a problem on N intervals.
 
     Attributes:
-        function: (x, u, costate, sigma, t, h, p0, p1, p at the end), columns over the stages,
-            to what ``View`` consists of.
+        look: (x, u, costate, sigma, data) to what ``View`` consists of; the data are t, h, p0,
+            p1 of all stages, and the parameters at the end.
+        go: (x, u, costate, share, law, gaps, data) to x, u, costate.
     """
 
-    function: Buffered
+    look: Buffered
+    go: Buffered
 
     @classmethod
     def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "NewtonStep":
         """Build it; ``fast``: stage and recursion as machine code."""
-        return cls(Buffered(_function(ocp, n, integrator, fast)))
+        return cls(
+            Buffered(_look(ocp, n, integrator, fast)), Buffered(_go(ocp, n, integrator, fast))
+        )
 
     def view(self, at: Iterate, sigma: float, schedule: list[np.ndarray]) -> View:
         """Evaluate.
@@ -106,16 +109,46 @@ class NewtonStep:
                 controls alone, which is positive definite if and only if every Q_uu is.
             schedule: t, h, p0, p1 of all stages, and the parameters at the end.
         """
-        results = self.function(at.x, at.u, at.costate, sigma, *schedule)
-        dx, du, dcostate, pivots, numbers = results
-        return View(dx, du, dcostate, pivots, *numbers.ravel().tolist())
+        law, gap, pivots, numbers = self.look(at.x, at.u, at.costate, sigma, *schedule)
+        return View(law, gap, pivots, *numbers.ravel().tolist())
+
+    def moved(self, at: Iterate, view: View, share: float, schedule: list[np.ndarray]) -> Iterate:
+        """Return where a share of the step from an iterate leads, by the model itself."""
+        laws = (view.law, view.gap_by_stage)
+        return Iterate(*self.go(at.x, at.u, at.costate, share, *laws, *schedule))
 
 
-def _function(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Function:
+def _symbols(ocp: OCP, n: int) -> dict[str, ca.MX]:
     nx, nu, n_p = ocp.model.nx, ocp.model.nu, ocp.p.numel()
-    shapes = {"x": (nx, n + 1), "u": (nu, n), "costate": (nx, n + 1), "sigma": (1, 1)}
+    shapes = {"x": (nx, n + 1), "u": (nu, n), "costate": (nx, n + 1), "share": (1, 1)}
+    shapes |= {"law": (2 * nx + nu, (nx + 1) * n), "gap": (nx, n)}
     shapes |= {"t": (1, n), "h": (1, n), "p0": (n_p, n), "p1": (n_p, n), "p_final": (n_p, 1)}
-    s = {name: ca.MX.sym(name, *shape) for name, shape in shapes.items()}
+    return {name: ca.MX.sym(name, *shape) for name, shape in shapes.items()}
+
+
+def _go(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Function:
+    """Return the law followed by the model: see ``NewtonStep.go``."""
+    s = _symbols(ocp, n)
+    stage = follow(Stage.of(ocp, integrator, held=True).step)
+    run = (compiled(stage) if fast else stage).mapaccum(n)
+    x, costate, share = s["x"], s["costate"], s["share"]
+    data = [s[name] for name in ("t", "h", "p0", "p1")]
+    along = (x[:, :-1], s["u"], costate[:, :-1], *data)
+    after, u, before = run(x[:, 0], ca.repmat(share, 1, n), s["law"], s["gap"], *along)
+    _, slope, hessian = _end(ocp)(x[:, -1], s["t"][-1] + s["h"][-1], s["p_final"])
+    last = costate[:, -1] + share * (slope - costate[:, -1]) + hessian @ (after[:, -1] - x[:, -1])
+    results = [ca.horzcat(x[:, 0], after), u, ca.horzcat(before, last)]
+    return ca.Function("go", list(s.values()), results)
+
+
+def _look(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Function:
+    """Return the stages and the recursion: see ``NewtonStep.look``."""
+    nx, nu = ocp.model.nx, ocp.model.nu
+    s = _symbols(ocp, n)
+    del s["law"], s["gap"]
+    s["sigma"] = s.pop("share")
+    order = ("x", "u", "costate", "sigma", "t", "h", "p0", "p1", "p_final")
+    s = {name: s[name] for name in order}
     x, costate = s["x"], s["costate"]
     parts = [curvature(ocp, integrator), backwards(nx, nu), forwards(nx, nu)]
     stage, sweep, run = map(compiled, parts) if fast else parts
@@ -132,7 +165,8 @@ def _function(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Functi
     start = ca.horzcat(end_hessian, end_slope)
     _, law, pivots = sweep.mapaccum(n)(start, hessian, jacobian, slope, gap, shift)
     in_order = [(nx + 1) * k + i for k in last_first for i in range(nx + 1)]
-    dx, du, dcostate = run.mapaccum(n)(ca.MX.zeros(nx), law[:, in_order])
+    law = law[:, in_order]
+    dx, du, dcostate = run.mapaccum(n)(ca.MX.zeros(nx), law)
     dx = ca.horzcat(ca.MX.zeros(nx), dx)
     dcostate = ca.horzcat(dcostate, end_hessian @ dx[:, -1] + end_slope)
     slope, gap = slope[:, last_first], gap[:, last_first]
@@ -144,13 +178,14 @@ def _function(ocp: OCP, n: int, integrator: Integrator, fast: bool) -> ca.Functi
         ca.norm_2(ca.vec(gap)),
         ca.norm_2(ca.vertcat(ca.vec(slope), end_slope)),
         ca.norm_inf(ca.vec(costate)),
+        ca.norm_inf(ca.vec(costate + dcostate)),
         # From the step's own equations: the gaps close linearly, the slopes vanish.
         along + ca.dot(costate[:, 1:], gap),
         ca.dot(dcostate[:, 1:], gap) - along,
         ca.norm_inf(ca.vec(hessian[nx:, :])),
     ]
-    results = [dx, du, dcostate, pivots[:, last_first], ca.vertcat(*numbers)]
-    return ca.Function("newton_step", list(s.values()), results)
+    results = [law, gap, pivots[:, last_first], ca.vertcat(*numbers)]
+    return ca.Function("look", list(s.values()), results)
 
 
 def _end(ocp: OCP) -> ca.Function:

@@ -46,10 +46,37 @@ def backwards(nx: int, nu: int) -> ca.Function:
 
 
 def forwards(nx: int, nu: int) -> ca.Function:
-    """Return what the law says: (dx, law) -> (dx after, du, change of the costate)."""
+    """Return what the law says of the linear model: (dx, law) -> (dx after, du, dp)."""
     dx, law = ca.SX.sym("dx", nx), ca.SX.sym("law", 2 * nx + nu, nx + 1)
     outputs = ca.vertsplit(law @ ca.vertcat(dx, 1), [0, nx, nx + nu, 2 * nx + nu])
     return ca.Function("forwards", [dx, law], outputs)
+
+
+def follow(step: ca.Function) -> ca.Function:
+    r"""Return what the law makes of the model itself.
+
+    With a share s of the step, from a state y where the iterate has x, u, p,
+
+    .. math:: \hat u = u + K (y - x) + s \kappa, \quad \hat p = p + P (y - x) + s v, \quad
+              \hat y = F(y, \hat u) - (1 - s) c
+
+    so that gaps shrink as the linear model says, and a full step closes them.
+    Source: [Giftthaler et al. 2018].
+
+    Returns:
+        a function of (y, share, law, c, x, u, p, t, h, p0, p1) that returns y after, u and p.
+    """
+    nx, nu = step.size1_in(0), step.size1_in(1)
+    y, share, gap = ca.SX.sym("y", nx), ca.SX.sym("share"), ca.SX.sym("gap", nx)
+    law = ca.SX.sym("law", 2 * nx + nu, nx + 1)
+    x, u, costate = ca.SX.sym("x", nx), ca.SX.sym("u", nu), ca.SX.sym("costate", nx)
+    moves = law[nx:, :] @ ca.vertcat(y - x, share)
+    control = u + moves[:nu]
+    rest: list = [ca.SX.sym(step.name_in(i), step.size_in(i)) for i in range(2, 6)]
+    after, _ = step.call([y, control, *rest])
+    inputs = [y, share, law, gap, x, u, costate, *rest]
+    outputs = [after - (1 - share) * gap, control, costate + moves[nu:]]
+    return ca.Function("follow", inputs, ca.cse([ca.densify(o) for o in outputs]))
 
 
 def _solved(matrix: ca.SX, right: ca.SX) -> tuple[ca.SX, ca.SX]:
