@@ -1,4 +1,4 @@
-"""What is known at an iterate, and the Newton step from there, as one function."""
+"""What is known at an iterate, and the Newton step from there: a function each."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -39,7 +39,7 @@ class View:
         next_costate: largest abs(p) after the step.
         cost_slope: slope of the cost along the step.
         bend: second derivative of the (shifted) Lagrangian along the step.
-        size: largest row sum of H_uu and H_ux, to measure a shift by.
+        size: largest element of H_uu and H_ux, to measure a shift by.
     """
 
     law: np.ndarray

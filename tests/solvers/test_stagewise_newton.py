@@ -11,19 +11,24 @@ from benchmarks.mpc.arm_loop import loop
 from models import rayleigh, seven_links, van_der_pol
 from ocp import (
     OCP,
+    RK4,
     Box,
     Compiler,
     Constraint,
+    Data,
     FreeTime,
     Guess,
     Model,
     ProblemError,
     Solution,
     Status,
+    Transcription,
     UnsupportedProblem,
     solve,
 )
 from solvers import MultipleShooting, StagewiseNewton
+from solvers.direct.intervals import Intervals
+from solvers.direct.newton_step import Iterate, NewtonStep
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import OTHER, ends, moving, oscillator, point, quartic, tracker
 
@@ -101,6 +106,60 @@ def test_seven_links_without_their_limits() -> None:
     ocp = seven_links(gain=10.0, clearance=None, joint_bounds=None)
     # IPOPT scales this cost: at its 1e-9 it still lies 4e-10 above the minimum.
     agree(solve(ocp, StagewiseNewton(30)), solve(ocp, MultipleShooting(30, tolerance=1e-11)))
+
+
+# -- the step ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sigma", [0.0, 3.0])
+@pytest.mark.parametrize("make", [tracker, quartic, van_der_pol], ids=lambda m: m.__name__)
+def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
+    """At the first node, where the law and its linear model agree, against a dense solve."""
+    ocp, n = make(), 4
+    nx, nu = ocp.model.nx, ocp.model.nu
+    transcription = Transcription(ocp, n, RK4())
+    rng = np.random.default_rng(1)
+    at = Iterate(*[rng.normal(size=(rows, n + k)) / 3 for rows, k in ((nx, 1), (nu, 0), (nx, 1))])
+    data = Data(ocp.start(), 0.3, ocp.parameter_values())
+    program = transcription.program
+    lam = ca.MX.sym("lam", nx * n)
+    lagrangian = program["f"] - ca.dot(lam, program["g"])
+    derivatives = ca.Function("derivatives", [program["x"], lam, program["p"]], [
+        *ca.hessian(lagrangian, program["x"]), ca.jacobian(program["g"], program["x"]), program["g"]
+    ])  # fmt: skip
+    w, costates = transcription.join(at.x.T, at.u.T), at.costate.T[1:].ravel()
+    values = derivatives(w, costates, transcription.data_vector(data))
+    hessian, slope, jacobian, gap = (np.array(value) for value in values)
+    is_control = transcription.join(np.zeros((n + 1, nx)), np.ones((n, nu)))
+    hessian += sigma * np.diag(is_control)
+    moves = np.arange(len(w)) >= nx  # the start stays
+    kkt = np.block([[hessian[moves][:, moves], -jacobian[:, moves].T],
+                    [jacobian[:, moves], np.zeros((nx * n, nx * n))]])  # fmt: skip
+    step = np.linalg.solve(kkt, -np.concatenate([slope[moves], gap]))[:, 0]
+    dw = np.concatenate([np.zeros(nx), step[: moves.sum()]])
+    start = slope[:nx, 0] + (hessian @ dw)[:nx] - jacobian[:, :nx].T @ step[moves.sum() :]
+
+    newton = NewtonStep.of(ocp, n, RK4(), fast=False)
+    intervals = Intervals.of(ocp, n, RK4(), fast=False)
+    schedule = [*intervals.schedule(data, ocp.duration), data.values.at(1.0)[0]]
+    view = newton.view(at, sigma, schedule)
+    there = newton.moved(at, view, 1.0, schedule)
+    np.testing.assert_allclose(there.u[:, 0] - at.u[:, 0], dw[nx : nx + nu], rtol=1e-9)
+    np.testing.assert_allclose(there.costate[:, 0], start, rtol=1e-9)
+    assert view.cost_slope == pytest.approx(float(derivative(program, w, data, transcription) @ dw))
+    assert view.bend == pytest.approx(float(dw @ hessian @ dw))
+    half = newton.moved(at, view, 0.5, schedule)
+    gaps = (newton.view(part, 0.0, schedule).gap for part in (at, half, there))
+    before, middle, after = gaps
+    assert middle == pytest.approx(0.5 * before)
+    assert after == pytest.approx(0.0, abs=1e-12)
+
+
+def derivative(program: dict, w: np.ndarray, data: Data, transcription: Transcription):
+    """The gradient of the cost in the unknowns."""
+    slope = ca.gradient(program["f"], program["x"])
+    function = ca.Function("slope", [program["x"], program["p"]], [slope])
+    return np.array(function(w, transcription.data_vector(data))).ravel()
 
 
 # -- how quickly -------------------------------------------------------------------------
