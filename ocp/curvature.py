@@ -24,7 +24,8 @@ def curvature(ocp: OCP, integrator: Integrator) -> ca.Function:
     The Jacobian follows the slopes forwards, the weights of the slopes (the adjoint of the
     step) backwards, and with Z_i = dz_i/dw the second derivative is the sum of Z_i' H_i Z_i:
     curvature of anything but the slopes there is none. Written out for all slopes at once the
-    same takes 4 to 8 times the code on arms with 3 to 6 links. Source: [Griewank & Walther 2008], chapter 5.
+    same takes 4 to 8 times the code on arms with 3 to 6 links.
+    Source: [Griewank & Walther 2008], chapter 5.
 
     Args:
         ocp: the problem; what depends on a free final time is left out.

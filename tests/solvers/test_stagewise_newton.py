@@ -205,6 +205,32 @@ def test_the_second_order_condition_fails_at_the_conjugate_point(duration, statu
         assert not solution.status.is_success
 
 
+@pytest.mark.parametrize(
+    "terms",
+    [
+        {"running_cost": lambda x, u: -(u**2)},
+        {"running_cost": lambda x, u: u**2 - 10 * x**2},
+        {"running_cost": lambda x, u: x},
+        {"terminal_cost": lambda x, u: -3 * x**2},
+    ],
+    ids=["-u^2", "u^2 - 10 x^2", "x", "-3 x(1)^2"],
+)
+def test_a_cost_without_lower_bound_is_no_success(terms: dict) -> None:
+    """u = 0 is stationary in three of them."""
+    solution = solve(point(**terms), StagewiseNewton(20))
+    assert not solution.status.is_success
+    assert np.isfinite(solution.x).all()
+
+
+def test_the_iteration_limit_and_a_coarse_integrator_are_told() -> None:
+    few = solve(van_der_pol(), StagewiseNewton(20, max_iterations=2))
+    assert few.status is Status.ITERATION_LIMIT
+    assert "after 2 Newton steps" in few.message
+    coarse = solve(moving(lambda x, u: -100 * x + u, x0=1.0), StagewiseNewton(20))
+    assert coarse.status is Status.INACCURATE
+    assert "a state moves by" in coarse.message
+
+
 def test_a_control_that_costs_nothing_is_stationary_only() -> None:
     """The cost does not see u_1: its minimum is not a strict one."""
     x, u = ca.SX.sym("x"), ca.SX.sym("u", 2)
