@@ -25,7 +25,15 @@ from ocp import (
     replay,
     solve,
 )
-from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
+from solvers import (
+    Collocation,
+    Greedy,
+    IndirectShooting,
+    LinearMPC,
+    MultipleShooting,
+    Riccati,
+    Schuetz,
+)
 from tests.mpc.problems import Scripted, cart
 
 DT = 0.1
@@ -41,7 +49,13 @@ def driver(**options) -> MPC:
 
 @pytest.mark.parametrize(
     "solver",
-    [MultipleShooting(20), Schuetz.sound(intervals=20), IndirectShooting(), Greedy(intervals=20)],
+    [
+        MultipleShooting(20),
+        Collocation(8, 3),
+        Schuetz.sound(intervals=20),
+        IndirectShooting(),
+        Greedy(intervals=20),
+    ],
     ids=lambda solver: type(solver).__name__,
 )
 def test_continuous_solvers_run_in_the_loop(solver) -> None:
