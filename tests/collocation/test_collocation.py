@@ -20,6 +20,7 @@ from models import (
 from ocp import (
     OCP,
     Constraint,
+    Data,
     FreeTime,
     Guess,
     Parameter,
@@ -63,24 +64,34 @@ PROBLEMS: dict[str, Callable[[], OCP]] = {
     "arm, velocity form": lambda: arm_scenario("arm-002").ocp(form="velocity"),
     "arm, clearance": lambda: arm_scenario("arm-003").ocp(clearance=0.1),
 }
+SLOW = {name for name in PROBLEMS if name.startswith("arm, ")}
+
+
+# Held controls on 75 intervals come within O(h^2) in cost, but for these (cost, costate):
+COARSE = {
+    # They leave the power limit by 0.03 between the nodes, and gain by it (0.0138 for 300).
+    "state, path, terminal inequality": (5e-2, 0.3),
+    # They leave the task by 0.02, and pay for it: 6.8067 for 300, 6.7909 here.
+    "arm, velocity form": (1e-2, 0.05),
+}
 
 
 @both
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PROBLEMS]
+)
 def test_agrees_with_multiple_shooting(name: str, points: Family) -> None:
+    """6 divides 12: the knots of the tracker's signals are edges."""
     ocp = PROBLEMS[name]()
-    held, solution = solve(ocp, MultipleShooting(75)), solve(ocp, Collocation(15, points=points))
+    held, solution = solve(ocp, MultipleShooting(75)), solve(ocp, Collocation(12, points=points))
     assert solution.status is Status.SOLVED, solution.message
     assert np.all(ocp.control_bounds.excess(solution.u) == 0.0)
     verdict = evaluate(solution)
-    # A held control costs O(h^2) more; a jerky one (the power limit of "cornered") O(h).
-    limit = 1e-2 if name == "state, path, terminal inequality" else 1e-3
+    limit, limit_costate = COARSE.get(name, (1e-3, 0.02))
     assert verdict.cost == pytest.approx(evaluate(held).cost, rel=limit)
     assert solution.cost == pytest.approx(verdict.cost, rel=1e-4)
     size = 1.0 + np.abs(held.costate).max()
-    np.testing.assert_allclose(
-        solution.costate[0], held.costate[0], atol=(0.1 if limit > 1e-3 else 0.02) * size
-    )
+    np.testing.assert_allclose(solution.costate[0], held.costate[0], atol=limit_costate * size)
 
 
 @both
@@ -159,27 +170,25 @@ def test_initial_inequality_and_a_wall_at_a_free_start() -> None:
     solution = solve(walled, Collocation(3))
     assert solution.status is Status.INFEASIBLE
     assert "'wall'" in solution.message or "'gate'" in solution.message
-    near = point(
-        constraints=lambda x, u: (
-            Constraint("gate", x, -1.0, 2.0, at="initial"),
-            Constraint("wall", x**2, upper=2.25 + 9.0 * x),
-            *ends(-0.2)(x, u),
-        )
+    # A wall at 0.5, 0.8 from the end: the start would rather be nearer to 3.
+    behind = point(
+        constraints=lambda x, u: (*gate(x, u), Constraint("wall", x * (3.0 - x), upper=1.25))
     )
-    assert solve(near, Collocation(3)).status is Status.SOLVED
+    start = solve(behind, Collocation(3)).x[0, 0]
+    assert start * (3.0 - start) <= 1.25 + MINIMISER
 
 
-def test_what_holds_where() -> None:
-    """Radau keeps a state bound at the points, the ends of the intervals among them."""
+@both
+def test_what_holds_where(points: Family) -> None:
+    """State bounds and path constraints at the points: with Radau ends of intervals, too."""
     ocp = bryson_denham()
-    for family, at_edges in (("radau", True), ("gauss", False)):
-        solution = solve(ocp, Collocation(7, points=family))  # pyright: ignore[reportArgumentType]
-        excess = ocp.state_bounds.excess(solution.x).max(axis=1)
-        edges = solution.breaks
-        assert np.delete(excess, edges).max() == 0.0
-        assert (excess[edges].max() == 0.0) == at_edges
-        # Between the points both violate it, and the referee says so.
-        assert evaluate(solution).violation > 1e-6
+    program = Collocation(7, points=points).build(ocp)
+    grid, solution = program.transcription.grid, program.run()
+    assert set(grid.edge_nodes[1:]) <= set(grid.point_nodes) or points == "gauss"
+    assert not set(grid.edge_nodes) & set(grid.point_nodes) or points == "radau"
+    assert ocp.state_bounds.excess(solution.x[grid.point_nodes]).max() == 0.0
+    # Between the points it is violated, and the referee says so.
+    assert 1e-6 < evaluate(solution).violation < 1e-3
 
 
 # -- meshes -----------------------------------------------------------------------------
@@ -188,18 +197,17 @@ meshes = st.lists(st.tuples(st.floats(0.1, 1.0), st.integers(2, 5)), min_size=1,
 
 
 @given(meshes, st.sampled_from(["radau", "gauss"]))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 def test_energy_is_exact_on_any_mesh(cells: list[tuple[float, int]], points: Family) -> None:
-    """A line in u and a cubic in x: from degree 3 on, or with Gauss' weights of order 4, exact."""
+    """A line in u and a cubic in x: exact from degree 3 on."""
     widths = np.array([width for width, _ in cells])
     edges = np.append(0.0, np.cumsum(widths) / widths.sum())
     edges[-1] = 1.0
     mesh = Mesh(tuple(edges), tuple(d for _, d in cells))
     solution = solve(double_integrator_energy(), Collocation(points=points, mesh=mesh))
-    assert solution.status is Status.SOLVED
-    assert evaluate(solution).cost >= 6.0 - CERTIFIED
     assert len(solution.u) == len(cells) * max(mesh.degrees)
     if min(mesh.degrees) > 2:
+        assert solution.status is Status.SOLVED
         assert evaluate(solution).cost == pytest.approx(6.0, rel=CERTIFIED)
         np.testing.assert_allclose(
             solution.costate, np.stack([0 * solution.t - 12.0, 12 * solution.t - 6.0], 1), atol=1e-6
@@ -251,10 +259,11 @@ def test_a_maximum_is_left(points: Family) -> None:
 
 def test_a_start_that_blows_up_is_replaced() -> None:
     """The roll-out of u = 0 leaves every bound: the first iterate then stays at the start."""
-    ocp = moving(lambda x, u: x**3 + u, x0=2.0)
-    solution = solve(ocp, Collocation(20))
-    assert solution.status is Status.SOLVED
-    assert np.isfinite(solution.x).all()
+    ocp = moving(lambda x, u: x**3 + u, x0=1.2, constraints=ends(1.0))
+    program = Collocation(20).build(ocp)
+    first = program._first_iterate(Data(ocp.start(), 0.0, ocp.parameter_values()), None)
+    assert np.abs(first.x).max() == 1.2
+    assert program.run().status is Status.SOLVED
 
 
 def test_deterministic() -> None:
