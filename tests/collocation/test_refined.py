@@ -30,7 +30,7 @@ both = pytest.mark.parametrize("points", ["radau", "gauss"])
     ("make", "reference"),
     [
         (van_der_pol, 1.047806908220),
-        (rayleigh, 29.376079655945),
+        pytest.param(rayleigh, 29.376079655945, marks=pytest.mark.slow),
         pytest.param(hypersensitive, 1.330806904945, marks=pytest.mark.slow),
     ],
 )
@@ -60,6 +60,7 @@ def test_the_arm_agrees_with_its_extremal(name: str) -> None:
     assert solution.cost == pytest.approx(extremal.cost, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_history_tells_where_the_mesh_went() -> None:
     """Hypersensitive: short intervals at both ends, long ones between; nothing is coarsened."""
     found = refined(solve(hypersensitive(), MultipleShooting(40)))
