@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
-from scipy.optimize import brentq, fsolve
+from scipy.optimize import brentq, fsolve, minimize
 
 from benchmarks.cases import LIBRARY
 from models import mass_spring_damper, stable_plant, two_link_arm_energy, unstable_plant
@@ -186,7 +186,25 @@ def sampled_mass() -> float:
     return recursion(a, b, np.eye(2), 1.0, np.eye(2), 20, np.array([1.0, 0.0]))
 
 
+def tube(end: float) -> float:
+    """What is left of the first two substances, less 1: u = 1, constant, 0."""
+
+    def rate(u: float) -> np.ndarray:
+        return np.array([[-u, 10.0 * u], [u, -10.0 * u - (1.0 - u)]])
+
+    def left(z: np.ndarray) -> float:
+        first, u, last = z
+        flow = expm((end - last) * rate(0.0)) @ expm((last - first) * rate(u))
+        return float((flow @ expm(first * rate(1.0)))[:, 0].sum() - 1.0)
+
+    options = {"xatol": 1e-10, "fatol": 1e-16, "maxiter": 2000}
+    return float(minimize(left, [0.13, 0.22, end - 0.27], method="Nelder-Mead",
+                          options=options).fun)  # fmt: skip
+
+
 ROOTS: dict[str, Callable[[], float]] = {
+    "catalyst-mixing": lambda: tube(1.0),
+    "two-catalysts": lambda: tube(4.0),
     "brachistochrone": brachistochrone,
     "linear-tangent-steering": tangent_steering,
     "hanging-chain": chain,
