@@ -16,7 +16,8 @@ def catalyst_mixing() -> OCP:
     Optimum: -0.0480557; bang, singular, bang: u = 1 until 0.1363, 0.2271 on the singular arc, 0
     from 0.7252 on. The problem is linear in x at a given u: only the ratio x_2/x_1 matters, a
     singular arc rests at one ratio, so u is constant on it, and the cost follows from the
-    exponentials of three matrices, least over the two switches and that u. Problem: [Dolan, More & Munson 2004].
+    exponentials of three matrices, least over the two switches and that u. Problem:
+    [Dolan, More & Munson 2004].
     """
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
     first = u * (10.0 * x[1] - x[0])
