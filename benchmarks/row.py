@@ -27,7 +27,8 @@ Key = tuple[str, str, str, str]
 class Row:
     """A result as it is written; times in s, gap relative, None where a thing does not exist.
 
-    ``cost``, ``violation``, ``stationarity`` and ``task_drift`` are the referee's.
+    ``cost``, ``violation``, ``stationarity`` and ``task_drift`` are the referee's; ``lower`` is the
+    lower end of the reference.
     """
 
     suite: str
@@ -42,6 +43,7 @@ class Row:
     optimum: bool | None
     cost: float | None
     reference: float | None
+    lower: float | None
     gap: float | None
     local_gap: float | None
     violation: float | None
@@ -76,7 +78,8 @@ class Row:
             solved=solved,
             optimum=None if gap is None else solved and abs(gap) <= SAME_OPTIMUM,
             cost=_finite(verdict.cost),
-            reference=case.reference,
+            reference=case.reference.value if case.reference else None,
+            lower=case.reference.lower if case.reference else None,
             gap=_finite(gap),
             local_gap=_finite(outcome.local_gap),
             violation=_finite(verdict.violation),

@@ -25,7 +25,10 @@ def chosen(case_names, method_names):
     return tasks_of(cases, methods, Settings(starts=1))
 
 
-SMALL = chosen({"van-der-pol", "double-integrator-energy"}, {"direct-75", "polish-1e-10"})
+SMALL = chosen({"van-der-pol", "double-integrator-energy"}, {"direct-coarse", "extremal"})
+
+
+KILLED = ["van-der-pol", "rayleigh", "goddard", "two-link-arm-energy", "polar-arm"]
 
 
 def test_a_row_has_what_the_readme_promises(tmp_path):
@@ -53,7 +56,7 @@ def test_without_resume_rows_are_computed_again_and_the_newest_counts(tmp_path):
     assert len(rows) == 1
 
 
-@pytest.mark.parametrize("damage", ['{"suite": "textbook", "ca', "not json at all\n", "{}\n"])
+@pytest.mark.parametrize("damage", ['{"suite": "library", "ca', "not json at all\n", "{}\n"])
 def test_a_damaged_line_costs_that_row_only(tmp_path, damage):
     sweep(SMALL[:1], tmp_path, workers=1, resume=False, progress=False)
     file = tmp_path / RESULTS
@@ -65,8 +68,9 @@ def test_a_damaged_line_costs_that_row_only(tmp_path, damage):
 
 @pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_was(tmp_path):
-    command = [sys.executable, "-m", "benchmarks", "run", "--suite", "textbook", "--starts", "3"]
-    command += ["--solver", "direct-75", "direct-150", "--workers", "2", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "benchmarks", "run", "--case", *KILLED]
+    command += ["--solver", "direct-coarse", "direct-fine", "--workers", "2"]
+    command += ["--out", str(tmp_path)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     file = tmp_path / RESULTS
     deadline = time.monotonic() + 60
@@ -78,8 +82,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
     finished = subprocess.run([*command, "--resume"], capture_output=True, text=True, check=False)
     assert finished.returncode == 0, finished.stdout
     assert file.read_bytes().startswith(before)
-    undisturbed = {(case.name, solver) for case in all_cases() if case.suite == "textbook"
-                   for solver in ("direct-75", "direct-150")}  # fmt: skip
+    undisturbed = {(case, solver) for case in KILLED for solver in ("direct-coarse", "direct-fine")}
     assert {(row.case, row.solver) for row in read_rows(file)} == undisturbed
 
 
