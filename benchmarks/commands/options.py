@@ -30,6 +30,18 @@ def positive(text: str) -> int:
     return number
 
 
+def seconds(text: str) -> float:
+    """Return a positive time [s].
+
+    Raises:
+        ArgumentTypeError: if it is not one; argparse says so.
+    """
+    number = float(text)
+    if not 0.0 < number < float("inf"):
+        raise ArgumentTypeError(f"{text} is no time that passes")
+    return number
+
+
 def add_out(parser: ArgumentParser) -> None:
     """Declare the folder of the results."""
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
