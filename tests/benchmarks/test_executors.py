@@ -1,5 +1,6 @@
 """The same sweep on a Dask cluster, and what is said where there is none."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -15,13 +16,14 @@ from tests.benchmarks.test_sweep import SMALL
 distributed = pytest.importorskip("distributed")
 # Nobody listens there: port 9 is that of a service which is no longer used.
 NOBODY = "tcp://127.0.0.1:9"
+DASHBOARD = "127.0.0.1:0"  # any free port
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[str]:
     """Address of two workers in processes that may have no children of multiprocessing."""
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None
+        n_workers=2, threads_per_worker=1, dashboard_address=DASHBOARD
     ) as cluster:
         yield cluster.scheduler_address
 
@@ -49,26 +51,24 @@ def test_the_command_line_reaches_a_cluster(tmp_path, cluster):
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away_ends_the_sweep_not_the_rows(tmp_path):
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None
+        n_workers=1, threads_per_worker=1, dashboard_address=DASHBOARD
     ) as cluster:
         execution = Execution(scheduler=cluster.scheduler_address)
-        with pytest.raises(SweepError, match="has gone"), execution.open() as executor:
-            future = executor.submit(sum, [1, 2])
-            assert future.result(timeout=30) == 3
-            waiting = executor.submit(_wait, 30)
-            cluster.close()
-            waiting.result(timeout=60)
+        with pytest.raises(SweepError, match="has gone"):
+            _lose(execution, cluster)
 
 
-def _wait(seconds: float) -> None:
-    import time
-
-    time.sleep(seconds)
+def _lose(execution: Execution, cluster) -> None:
+    with execution.open() as executor:
+        assert executor.submit(sum, [1, 2]).result(timeout=30) == 3
+        waiting = executor.submit(time.sleep, 30.0)
+        cluster.close()
+        waiting.result(timeout=60)
 
 
 @pytest.mark.slow
 def test_a_cluster_without_workers_is_named(tmp_path):
-    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=0, dashboard_address=DASHBOARD) as cluster:
         execution = Execution(scheduler=cluster.scheduler_address, patience=1.0)
         with pytest.raises(SweepError, match="has no workers"):
             sweep(SMALL[:1], tmp_path, resume=False, execution=execution, progress=False)
