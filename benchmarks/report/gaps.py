@@ -10,8 +10,8 @@ from benchmarks.report.sheet import Sheet
 from benchmarks.report.strips import strips
 from benchmarks.row import Row
 
-_FLOOR = 1e-10
-_NO_VIOLATION = 1e-16
+_GAPS = (1e-10, 1e4)
+_VIOLATIONS = (1e-16, 1e4)
 _HOW = (
     "A dot is a row, a bar the median of a method, dotted lines the levels of the table above. The "
     "gap is the referee's cost above the reference, relative; of a cost below it, which the "
@@ -23,8 +23,10 @@ _HOW = (
 def gaps(rows: Sequence[Row]) -> Section:
     """Return the section on distributions."""
     blocks: list[Block] = [Text(_HOW)]
-    for part in parts_of(rows):
-        blocks += [_gap(part), _violation(part)]
+    parts = parts_of(rows)
+    blocks += sorted(
+        [*map(_gap, parts), *map(_violation, parts)], key=lambda block: block.kind != "plot"
+    )
     return Section("gaps", "Gap and violation", blocks)
 
 
@@ -35,7 +37,7 @@ def _gap(part: Part) -> Block:
     values = {m: [abs(r.gap) for r in part.of(m) if r.gap is not None] for m in part.methods}
     name = f"gap-{part.name}"
     limits = sorted({level.gap for level in LEVELS})
-    svg = strips(name, values, part.colours, axis="|gap|, relative", floor=_FLOOR, limits=limits)
+    svg = strips(name, values, part.colours, "|gap|, relative", *_GAPS, limits)
     data = Sheet(name, ("method", "case", "starts", "seed", "gap, relative"), lines, folded=True)
     return Plot(name, f"{part.title}: distance from the reference", svg, data)
 
@@ -53,8 +55,7 @@ def _violation(part: Part) -> Block:
     values = {m: [r.violation for r in part.of(m) if r.violation is not None] for m in part.methods}
     name = f"violation-{part.name}"
     limits = sorted({level.violation for level in LEVELS})
-    axis = "largest violation"
-    svg = strips(name, values, part.colours, axis=axis, floor=_NO_VIOLATION, limits=limits)
+    svg = strips(name, values, part.colours, "largest violation", *_VIOLATIONS, limits)
     columns = ("method", "case", "starts", "seed", "violation", "of what")
     return Plot(
         name,

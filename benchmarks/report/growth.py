@@ -18,15 +18,16 @@ Curve = list[tuple[int, float]]
 
 _HOW = (
     "The median time of an iteration over the number of states n and over the intervals N of the "
-    "grid, for methods whose rows have at least two different ones. The time of a whole solve "
-    "would mix in how many iterations a start needs. The exponent p is that of time ~ size^p, by "
-    "least squares of the logarithms; of two points it is no more than their slope."
+    "grid, for methods whose rows in a suite have at least two different ones. The time of a "
+    "whole solve would mix in how many iterations a start needs. The exponent p is that of time ~ "
+    "size^p, by least squares of the logarithms; of two points it is no more than their slope. "
+    "Only the suite “links” has problems that differ in nothing but their size."
 )
 
 
 def growth(rows: Sequence[Row]) -> Section:
     """Return the section on growth."""
-    over_n = _curves(rows, lambda row: row.solver, lambda row: row.states)
+    over_n = _curves(rows, lambda row: f"{row.suite}: {row.solver}", lambda row: row.states)
     over_grid = _curves(rows, _family, lambda row: row.intervals)
     blocks = [
         _block("growth-n", "states n", over_n, "two sizes of problem"),
@@ -36,8 +37,8 @@ def growth(rows: Sequence[Row]) -> Section:
 
 
 def _family(row: Row) -> str:
-    """The options of a method without the size of its grid, and its suite."""
-    options = re.sub(r"\b(intervals|segments|steps)=\d+", r"\1=…", row.settings)
+    """The suite, and the options of a method without the size of its grid."""
+    options = re.sub(r"\b(intervals|steps)=\d+", r"\1=…", row.settings)
     return f"{row.suite}: {options}"
 
 
@@ -88,9 +89,8 @@ def _block(name: str, axis: str, curves: Mapping[str, Curve], needed: str) -> Bl
 
 
 def _short(group: str) -> str:
-    """The name of a method, or of the class among its options and what follows from it."""
-    suite, _, options = group.partition(": ")
-    return f"{suite}: {options.partition('(')[0]}" if options else group
+    """The suite, and the method or the class that its options begin with."""
+    return group.partition("(")[0]
 
 
 def exponent(curve: Curve) -> float:

@@ -18,11 +18,15 @@ def _places(rows: Sequence[Row]) -> list[Block]:
     machines = [dict((*machine, *versions)) for machine, versions in places]
     names = list(dict.fromkeys(name for machine in machines for name in machine))
     lines = [[name, *(machine.get(name) for machine in machines)] for name in names]
-    lines.append(["rows", *places.values()])
+    lines.append(["rows", *map(str, places.values())])
     titles = ["here"] if len(machines) == 1 else [f"place {i + 1}" for i in range(len(machines))]
     when = sorted(row.when for row in rows)
-    span = f"The rows were computed from {when[0]} to {when[-1]} (UTC)."
+    span = f"The rows were computed from {_minute(when[0])} to {_minute(when[-1])} (UTC)."
     return [Text(span), Sheet("places", ["what", *titles], lines)]
+
+
+def _minute(when: str) -> str:
+    return when[:16].replace("T", " ")
 
 
 def _suites(rows: Sequence[Row]) -> Sheet:

@@ -4,13 +4,20 @@ import io
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import (
+    FixedFormatter,
+    FixedLocator,
+    FuncFormatter,
+    LogLocator,
+    NullFormatter,
+    NullLocator,
+)
 
 from benchmarks.report.sheet import Sheet
 
@@ -18,14 +25,14 @@ from benchmarks.report.sheet import Sheet
 _WIDTH = 5.6  # [inches of 72 units]
 COLOURS = 10
 # Stand-ins: the page replaces them by colours that suit its light or dark theme.
-_TEXT, _GRID = "#010203", "#030201"
-_STYLE = {
+TEXT, _GRID = "#010203", "#030201"
+_STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,
     "font.size": 10.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color"), _TEXT),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color"), TEXT),
     "axes.edgecolor": _GRID,
     "grid.color": _GRID,
     "axes.axisbelow": True,
@@ -62,13 +69,13 @@ class Plot:
 
     name: str
     title: str
-    svg: Markup
+    svg: str
     data: Sheet
     legend: Sequence[Legend] = ()
     kind = "plot"
 
 
-def drawn(name: str, height: float, draw: Callable[[Axes], None]) -> Markup:
+def drawn(name: str, height: float, draw: Callable[[Axes], None]) -> str:
     """Return a drawing as an SVG element without a single address or fixed colour.
 
     Args:
@@ -82,7 +89,7 @@ def drawn(name: str, height: float, draw: Callable[[Axes], None]) -> Markup:
         draw(figure.add_subplot())
         nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
         figure.savefig(text, format="svg", transparent=True, metadata=nothing)
-    return Markup(_fitted(text.getvalue(), name))
+    return _fitted(text.getvalue(), name)
 
 
 def colour(number: int) -> str:
@@ -102,16 +109,21 @@ def as_series(artists: Iterable, number: int) -> None:
 
 
 def powers_of_ten(axis: Axis) -> None:
-    """Write the numbers of a logarithmic axis as small as they are."""
+    """Write the numbers of a logarithmic axis as small as they are; its limits are set."""
+    low, high = axis.get_view_interval()
+    # Where hardly two powers of ten are in view, other numbers help.
+    between = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=between))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def power_of_ten(value: float) -> str:
-    """Return 0.001 as 10⁻³, what is no power of ten as it is."""
+    """Return 0.001 as 10⁻³; what is no power of ten, or a small one, as it is."""
     digits, _, exponent = f"{value:e}".partition("e")
-    if float(digits) != 1.0:
+    if float(digits) != 1.0 or abs(int(exponent)) < 2:
         return f"{value:g}"
-    return "1" if int(exponent) == 0 else f"10{str(int(exponent)).translate(_UP)}"
+    return f"10{str(int(exponent)).translate(_UP)}"
 
 
 def named_ticks(axis: Axis, names: Sequence[str]) -> None:
@@ -132,5 +144,5 @@ def _fitted(svg: str, name: str) -> str:
     svg = svg.replace("xlink:href", "href")
     svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)
     svg = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 var(--font)", svg)
-    svg = svg.replace(_TEXT, "currentColor").replace(_GRID, "var(--grid)")
+    svg = svg.replace(TEXT, "currentColor").replace(_GRID, "var(--grid)")
     return re.sub(r"#0a5e([0-9a-f]{2})", lambda found: f"var(--s{int(found[1], 16)})", svg)

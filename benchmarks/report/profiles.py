@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from benchmarks.report.level import LOW
 from benchmarks.report.plot import Plot
-from benchmarks.report.rows import Part, parts_of
+from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.steps import staircases
 from benchmarks.row import Row
@@ -35,7 +35,7 @@ def _part(part: Part) -> list[Block]:
         return [missing(f"{part.title}: {reason}, so there is nothing to compare.")]
     title = f"{part.title}, {len(shared)} cases"
     return [
-        _profile(part, shared, "time", f"{title}: solve time", lambda row: row.solve_time),
+        _profile(part, shared, "time", f"{title}: solve time", time_of),
         _profile(part, shared, "work", f"{title}: integrations", _work),
     ]
 

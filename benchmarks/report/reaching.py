@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from benchmarks.report.level import LEVELS, Level
 from benchmarks.report.plot import Plot
-from benchmarks.report.rows import Part, parts_of
+from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.steps import staircases
 from benchmarks.row import Row
@@ -33,7 +33,7 @@ def _plot(part: Part, level: Level) -> Plot:
     known = {row.case for row in part.rows if row.reference is not None}
     judged = {m: [row for row in part.of(m) if row.case in known] for m in part.methods}
     reached = {
-        m: [row.solve_time for row in rows if row.gap is not None and level.met_by(row)]
+        m: [time_of(row) for row in rows if row.gap is not None and level.met_by(row)]
         for m, rows in judged.items()
         if rows
     }

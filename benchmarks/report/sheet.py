@@ -30,9 +30,22 @@ class Sheet:
     kind = "sheet"
 
     @property
-    def shown(self) -> list[list[tuple[str, bool]]]:
-        """Cells as text, each with whether it is a number."""
-        return [[(text_of(c), is_number(c)) for c in line] for line in self.lines[:SHOWN]]
+    def shown(self) -> list[list[tuple[str, bool, Cell]]]:
+        """Cells as (text, whether it is a number, share in % to draw a bar for or None)."""
+        return [
+            [
+                (text_of(cell), is_number(cell), cell if title.endswith("[%]") else None)
+                for title, cell in zip(self.columns, line, strict=True)
+            ]
+            for line in self.lines[:SHOWN]
+        ]
+
+    @property
+    def titles(self) -> list[tuple[str, bool]]:
+        """Titles, each with whether numbers stand below it."""
+        cells = [[line[i] for line in self.lines] for i in range(len(self.columns))]
+        numeric = [any(map(is_number, column)) for column in cells]
+        return list(zip(self.columns, numeric, strict=True))
 
     @property
     def left_out(self) -> int:

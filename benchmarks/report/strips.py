@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.axes import Axes
 
 from benchmarks.report.plot import (
+    TEXT,
     as_series,
     colour,
     drawn,
@@ -23,11 +23,11 @@ def strips(
     name: str,
     values: Mapping[str, Sequence[float]],
     colours: Mapping[str, int],
-    *,
     axis: str,
     floor: float,
+    ceiling: float,
     limits: Sequence[float] = (),
-) -> Markup:
+) -> str:
     """Draw a strip for each method: a dot a row, a bar at the median.
 
     Args:
@@ -36,22 +36,24 @@ def strips(
         colours: by method, their numbers.
         axis: what the values are, with their unit.
         floor: what is smaller is drawn here.
+        ceiling: what is larger is drawn here.
         limits: values to mark by a line.
     """
 
     def draw(axes: Axes) -> None:
         for place, (method, here) in enumerate(values.items()):
-            _strip(axes, place, np.maximum(here, floor), colours[method])
+            _strip(axes, place, np.clip(here, floor, ceiling), colours[method])
         for limit in limits:
-            axes.axvline(limit, color=colour(0), ls=":", lw=1.0, alpha=0.6)
+            axes.axvline(limit, color=TEXT, ls=(0, (2, 3)), lw=0.9, alpha=0.7)
         axes.set_xscale("log")
-        every = [value for here in values.values() for value in here]
-        axes.set_xlim(floor / 2.5, 2.5 * max([10.0 * floor, *limits, *every]))
+        largest = max([10.0 * floor, *limits, *(max(here) for here in values.values() if here)])
+        axes.set_xlim(floor / 2.5, 2.5 * min(largest, ceiling))
         powers_of_ten(axes.xaxis)
         axes.grid(visible=False, axis="y")
         named_ticks(axes.yaxis, list(values))
         axes.set_ylim(len(values) - 0.4, -0.6)
-        axes.set_xlabel(f"{axis}; at the left edge: ≤ {power_of_ten(floor)}")
+        right = f", right: ≥ {power_of_ten(ceiling)}" if largest > ceiling else ""
+        axes.set_xlabel(f"{axis}; at the left edge: ≤ {power_of_ten(floor)}{right}")
 
     return drawn(name, 0.9 + 0.29 * len(values), draw)
 
