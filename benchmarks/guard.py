@@ -64,8 +64,9 @@ def _one_process(group: Group, tasks: Sequence[Task]) -> list[Row]:
             last = time.monotonic()
             rows = []
             for line in process.stdout:
-                rows.append(Row.parse(line))
-                last = time.monotonic()
+                if line.endswith("\n"):  # else it ended while it wrote
+                    rows.append(Row.parse(line))
+                    last = time.monotonic()
         elapsed = time.monotonic() - last
         if process.returncode == -signal.SIGINT:
             raise SweepError("interrupted")

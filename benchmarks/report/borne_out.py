@@ -16,9 +16,9 @@ def borne_out(rows: Sequence[Row]) -> Section:
     blocks: list[Block] = [Sheet("claims", ("", "claim", "evidence"), lines)]
     if not claims:
         blocks = [missing("These rows decide none of the claims.")]
-    elif not all(claim.holds for claim in claims):
+    else:
         note = "A claim speaks of a whole suite: on a part of it, it may fail, or hold, by chance."
-        blocks.append(Text(note))
+        blocks.insert(0, Text(note))
     wrong = [(r.case, r.solver, r.cost, r.reference, r.gap) for r in below_reference(rows)]
     if wrong:
         columns = ("case", "method", "cost", "reference", "gap")

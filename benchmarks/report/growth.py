@@ -85,7 +85,7 @@ def _block(name: str, axis: str, curves: Mapping[str, Curve], needed: str) -> Bl
         for number, (group, curve) in enumerate(curves.items())
     ]
     data = Sheet(name, ("method", axis, "time [s]", "exponent p"), lines, folded=True)
-    return Plot(name, f"Time of an iteration over {axis}", drawn(name, 3.0, draw), data, legend)
+    return Plot(name, f"Time of an iteration over {axis}", drawn(name, 2.7, draw), data, legend)
 
 
 def _short(group: str) -> str:

@@ -22,7 +22,7 @@ from matplotlib.ticker import (
 from benchmarks.report.sheet import Sheet
 
 # Narrow enough to be read on a phone; a wide window shows two side by side.
-_WIDTH = 5.6  # [inches of 72 units]
+_WIDTH = 4.9  # [inches of 72 units]
 COLOURS = 10
 # Stand-ins: the page replaces them by colours that suit its light or dark theme.
 TEXT, _GRID = "#010203", "#030201"

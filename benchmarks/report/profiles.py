@@ -1,4 +1,4 @@
-"""Performance profiles [Dolan & Moré 2002]: how often a method is the best, and how far behind."""
+"""Performance profiles [Dolan & More 2002]: how often a method is the best, and how far behind."""
 
 from collections.abc import Callable, Sequence
 
@@ -13,7 +13,7 @@ Setting = tuple[str, str, int, int]
 
 _HOW = (
     "Over τ, the share of the cases on which a method needs at most τ times what the best method "
-    "needs there [Dolan & Moré 2002]: at τ = 1 how often it is the best, far right how much it "
+    "needs there [Dolan & More 2002]: at τ = 1 how often it is the best, far right how much it "
     f"solves at all, by the level “{LOW.name}” of the table above. Only cases that all methods "
     "have been run on count. Once for the solve time, once for integrations of the trajectory "
     "and of its derivatives, which no machine changes."

@@ -12,7 +12,7 @@ from benchmarks.row import Row
 _HOW = (
     "The share of a method's rows that end within a gap of the reference, over the time that "
     "their solve took as a whole (without building; rows keep no times in between). A curve that "
-    "ends below 100 % has cases that the method does not bring that far. Times are of these "
+    "ends below 100\u00a0% has cases that the method does not bring that far. Times are of these "
     "machines, and of a solve alone: what a method that begins where another ended owes to that "
     "one is not in its time."
 )

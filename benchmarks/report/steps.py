@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from benchmarks.report.plot import Legend, Plot, as_series, colour, dashes, drawn, powers_of_ten
 from benchmarks.report.sheet import Sheet
 
-_HEIGHT = 3.0  # [inches]
+_HEIGHT = 2.7  # [inches]
 
 
 def staircases(

@@ -134,6 +134,23 @@ def test_a_sweep_killed_ten_times_has_the_rows_of_an_undisturbed_one(tmp_path):
     assert len(lines) == len(read_rows(calm / RESULTS)) == 18
 
 
+@pytest.mark.slow
+def test_the_keyboard_ends_a_sweep_with_a_word(tmp_path):
+    process = subprocess.Popen(
+        [*SWEPT, "--out", str(tmp_path)], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    file = tmp_path / RESULTS
+    while not (file.exists() and file.stat().st_size) and process.poll() is None:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    said, _ = process.communicate(timeout=120)
+    assert process.returncode == 130, said
+    assert "interrupted; what is in" in said
+    rows = read_rows(file)
+    assert rows
+    assert not any(row.is_lost for row in rows)
+
+
 def test_every_arm_case_is_run_by_what_it_declares():
     tasks = tasks_of(arm_cases(), all_methods(), Settings())
     by_case = {case.name: {t.method for t in tasks if t.case == case.name} for case in arm_cases()}
