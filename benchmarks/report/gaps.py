@@ -51,7 +51,7 @@ def _violation(part: Part) -> Block:
     if not lines:
         return missing(f"{part.title}: the referee could judge no row.")
     if not any(row.violation for row in part.rows):
-        return Text(f"{part.title}: none of the {len(lines)} judged rows violates anything.")
+        return Text(f"{part.title}: of {len(lines)} judged rows none violates anything.")
     values = {m: [r.violation for r in part.of(m) if r.violation is not None] for m in part.methods}
     name = f"violation-{part.name}"
     limits = sorted({level.violation for level in LEVELS})

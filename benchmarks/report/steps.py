@@ -34,14 +34,13 @@ def staircases(
     """
     steps = {m: _steps(values, totals[m]) for m, values in reached.items()}
     every = [value for values in reached.values() for value in values]
-    low, high = (min(every), max(every)) if every else (1.0, 1.0)
-    left, right = first or low / 1.3, 1.3 * high if high > (first or low) else 10.0 * high
+    left = first or min(every, default=1.0) / 1.3
+    right = max(1.3 * max(every, default=1.0), 3.0 * left)
 
     def draw(axes: Axes) -> None:
         for method, (x, y) in steps.items():
             number = colours[method]
-            along, up = [left, *x, right], [y[0] if x and x[0] <= left else 0.0, *y, *y[-1:]]
-            up = up if len(up) == len(along) else [0.0, *y, y[-1] if y else 0.0]
+            along, up = [left, *x, right], [0.0, *y, *(y[-1:] or [0.0])]
             style = {"ls": dashes(number), "color": colour(number), "lw": 1.8}
             as_series(axes.step(along, up, where="post", **style), number)
         axes.set_xscale("log")
@@ -51,9 +50,7 @@ def staircases(
         axes.set_xlabel(axis)
         axes.set_ylabel("share of the cases [%]")
 
-    lines = [
-        (m, float(a), float(b)) for m, (x, y) in steps.items() for a, b in zip(x, y, strict=True)
-    ]
+    lines = [(m, a, b) for m, (x, y) in steps.items() for a, b in zip(x, y, strict=True)]
     data = Sheet(name, ("method", axis, "share [%]"), lines, folded=True)
     legend = [Legend(method, colours[method]) for method in reached]
     return Plot(name, title, drawn(name, _HEIGHT, draw), data, legend)
