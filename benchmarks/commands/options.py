@@ -2,6 +2,7 @@
 
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -31,14 +32,14 @@ def positive(text: str) -> int:
 
 
 def seconds(text: str) -> float:
-    """Return a positive time [s].
+    """Return a positive, finite duration [s].
 
     Raises:
         ArgumentTypeError: if it is not one; argparse says so.
     """
     number = float(text)
-    if not 0.0 < number < float("inf"):
-        raise ArgumentTypeError(f"{text} is no time that passes")
+    if not 0.0 < number < inf:
+        raise ArgumentTypeError(f"{text} s is no duration")
     return number
 
 
