@@ -73,6 +73,5 @@ RUNS: tuple[Callable[[Case, Settings], Outcome], ...] = (
 )  # fmt: skip
 
 if __name__ == "__main__":
-    suites = frozenset({"textbook"})
-    work([Method(run.__name__, "direct", suites, run, "", "") for run in RUNS])
+    work([Method(run.__name__, "direct", frozenset(), run, "", "") for run in RUNS])
     sys.exit(0)

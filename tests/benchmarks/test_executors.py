@@ -11,7 +11,7 @@ from benchmarks.guard import SweepError
 from benchmarks.row import RESULTS
 from benchmarks.rows_file import read_rows
 from benchmarks.sweep import sweep
-from tests.benchmarks.test_sweep import SMALL
+from tests.benchmarks.test_sweep import DIRECT, QUICK, SMALL
 
 distributed = pytest.importorskip("distributed")
 # Nobody listens there: port 9 is that of a service which is no longer used.
@@ -42,7 +42,7 @@ def test_a_cluster_gives_the_same_rows_and_resumes(tmp_path, cluster):
 
 @pytest.mark.slow
 def test_the_command_line_reaches_a_cluster(tmp_path, cluster):
-    words = ["run", "--case", "double-integrator-energy", "--solver", "fatrop-75"]
+    words = ["run", "--case", QUICK.name, "--solver", DIRECT[0]]
     words += ["--executor", "dask", "--scheduler", cluster, "--out", str(tmp_path)]
     assert main(words) == 0
     assert len(read_rows(tmp_path / RESULTS)) == 1
@@ -82,7 +82,7 @@ def test_an_unreachable_scheduler_is_named_and_nothing_lost(tmp_path, address):
 
 
 def test_the_command_line_says_so_too(tmp_path, capsys):
-    words = ["run", "--case", "van-der-pol", "--solver", "direct-75", "--executor", "dask"]
+    words = ["run", "--case", QUICK.name, "--solver", DIRECT[0], "--executor", "dask"]
     assert main([*words, "--scheduler", NOBODY, "--out", str(tmp_path)]) == 2
     assert f"no Dask scheduler answers at {NOBODY}" in capsys.readouterr().out
 

@@ -6,10 +6,11 @@ from benchmarks.guard import Group, SweepError, run_group
 from benchmarks.method import Settings
 from benchmarks.row import CRASHED, TIMED_OUT, Row
 from benchmarks.task import Task
+from tests.benchmarks.test_sweep import QUICK
 
 
 def group(*methods: str, limit: float = 30.0) -> Group:
-    tasks = [Task("textbook", "double-integrator-energy", m, "", Settings()) for m in methods]
+    tasks = [Task(QUICK.suite, QUICK.name, m, "", Settings()) for m in methods]
     return Group(tuple(tasks), limit, "tests.benchmarks.faulty_child")
 
 
