@@ -25,8 +25,9 @@ def work(methods: Sequence[Method]) -> None:
     The kernel keeps the time: an alarm ends the process wherever it is, in compiled code too, and
     also where nobody waits for it any more.
     """
-    for number in (signal.SIGALRM, signal.SIGINT):
-        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as of a job in the background
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     answers = _own_output()
     order = json.load(sys.stdin)
     cases = {(case.suite, case.name): case for case in all_cases()}

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -141,7 +142,12 @@ def test_a_sweep_killed_ten_times_has_the_rows_of_an_undisturbed_one(tmp_path):
 @pytest.mark.slow
 def test_the_keyboard_ends_a_sweep_with_a_word(tmp_path):
     process = subprocess.Popen(
-        [*SWEPT, "--out", str(tmp_path)], stdout=subprocess.PIPE, text=True, start_new_session=True
+        [*SWEPT, "--out", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # Not so where the tests themselves run in the background.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     file = tmp_path / RESULTS
     while not (file.exists() and file.stat().st_size) and process.poll() is None:
