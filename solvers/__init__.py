@@ -3,6 +3,10 @@
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.diagnosis import Diagnosis
+from solvers.diagnose.examine import diagnose
+from solvers.diagnose.finding import Finding, Severity
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
@@ -40,10 +44,13 @@ __all__ = [
     "Axis",
     "Batch",
     "BetweenNodes",
+    "Cause",
     "Damped",
+    "Diagnosis",
     "Enumeration",
     "Exact",
     "Filtered",
+    "Finding",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
@@ -69,10 +76,12 @@ __all__ = [
     "Schuetz",
     "SecondOrder",
     "SelfMotion",
+    "Severity",
     "StepRule",
     "Table",
     "Task",
     "descend",
+    "diagnose",
     "enumerate_extremals",
     "gpc_loop",
     "multistart",

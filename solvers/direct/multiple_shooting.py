@@ -126,7 +126,7 @@ class MultipleShootingProgram(Program):
         ocp, tr = self.transcription.ocp, self.transcription
         data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
         bounds, p = tr.bounds(data), tr.data_vector(data)
-        z, u = self._first_iterate(data, guess or ocp.guess)
+        z, u = self.first_iterate(data, guess or ocp.guess)
         w0 = np.clip(tr.join(z, u), bounds["lbx"], bounds["ubx"])
         answers = [self.nlp.solve(w0, p, bounds)]
         status, message = self._verdict(answers[-1], data, bounds)
@@ -163,7 +163,7 @@ class MultipleShootingProgram(Program):
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def _first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
+    def first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
         """States and controls of the guess; without states, the controls' own roll-out."""
         tr = self.transcription
         ocp, m, nodes = tr.ocp, tr.ocp.model, tr.fractions
