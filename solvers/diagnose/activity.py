@@ -43,15 +43,16 @@ def _saturated(subject: Subject) -> Iterator[Finding]:
         for side in ("lower", "upper"):
             bound = float(np.asarray(getattr(ocp.control_bounds, side))[i])
             if np.isfinite(bound) and np.abs(u[:, i] - bound).max() <= _SAME * (1 + abs(bound)):
+                unit = subject.unit(name)
                 yield Finding(
                     Cause.SATURATED,
                     Severity.ADVICE,
                     (name,),
-                    f"The control {name} is on its {side} bound {bound:g} {subject.unit(name)}".rstrip()
+                    f"The control {name} is on its {side} bound {bound:g} {unit}".rstrip()
                     + " all the time: it is no decision. Is the bound, or the sign of its weight, "
                     "what was meant?",
                     bound,
-                    subject.unit(name),
+                    unit,
                 )
 
 

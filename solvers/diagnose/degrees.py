@@ -11,7 +11,7 @@ from solvers.diagnose.graph import depends, operations
 from solvers.diagnose.subject import Subject
 
 # Nobody turns by ten radians on purpose and in round numbers.
-_LEAST, _ROUND = 10.0, 5.0
+_LEAST, _ROUND, _ROUNDING = 10.0, 5.0, 1e-9
 
 
 def degrees(subject: Subject) -> Iterator[Finding]:
@@ -19,7 +19,7 @@ def degrees(subject: Subject) -> Iterator[Finding]:
     for i in _angles(subject):
         name = subject.ocp.model.x_names[i]
         for what, value in _numbers(subject, i):
-            if abs(value) >= _LEAST and abs(value / _ROUND - round(value / _ROUND)) < 1e-9:
+            if np.isfinite(value) and abs(value) >= _LEAST and value % _ROUND < _ROUNDING:
                 yield Finding(
                     Cause.DEGREES,
                     Severity.WARNING,

@@ -9,13 +9,17 @@ import numpy as np
 
 # A constraint that must give way by more than this, relative to its size, is violated.
 VIOLATED = 1e-5
+# Weight of the distance from the first iterate, which picks one of many answers. The penalty on
+# the slack is exact, so that it does not stretch what can be met.
+_NEAR = 1e-5
 _OPTIONS = {
+    "expand": True,
     "print_time": False,
     "error_on_fail": False,
     "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.max_iter": 200,
+    "ipopt.max_iter": 150,
 }
 
 
@@ -96,10 +100,12 @@ class Elastic:
     def _nlp(self) -> ca.Function:
         s = type(self.w).sym("s", len(self.demands))
         slack = s[[int(i) for i in self.owner]]
+        near = type(self.w).sym("near", self.w.numel())
+        apart = (self.w - near) / (1.0 + ca.fabs(near))
         nlp = {
             "x": ca.vertcat(self.w, s),
-            "p": self.p,
-            "f": ca.dot(s, ca.DM(1.0 / self._sizes)),
+            "p": ca.vertcat(self.p, near),
+            "f": ca.dot(s, ca.DM(1.0 / self._sizes)) + _NEAR * ca.sumsqr(apart),
             "g": ca.vertcat(self.hard, self.rows + slack, self.rows - slack),
         }
         return ca.nlpsol("elastic", "ipopt", nlp, _OPTIONS)
@@ -118,7 +124,7 @@ class Elastic:
         many, zeros = np.full(len(on), np.inf), np.zeros(self.hard.numel())
         answer = self._nlp(
             x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
-            p=p,
+            p=np.append(p, w0),
             lbx=np.append(self.box[0], np.zeros(len(gives))),
             ubx=np.append(self.box[1], np.where(gives, np.inf, 0.0)),
             lbg=np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),

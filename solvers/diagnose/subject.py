@@ -1,6 +1,6 @@
 """A problem under examination, with what several checks need, computed once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -11,6 +11,8 @@ from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingP
 
 # Random points around the guess, for what must hold wherever one looks.
 _RANDOM = 20
+# Intervals of the elastic problem, which is solved a dozen times.
+_COARSE = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,15 @@ class Subject:
     def program(self) -> MultipleShootingProgram:
         """The problem, built."""
         return self.solver.build(self.ocp)
+
+    @cached_property
+    def coarse(self) -> "Subject":
+        """The same on fewer intervals with more steps in each, where many solves are needed."""
+        if self.ocp.steps or self.solver.intervals <= _COARSE:
+            return self
+        steps = -(-self.solver.intervals * self.solver.integrator.steps // _COARSE)
+        finer = replace(self.solver.integrator, steps=steps)
+        return replace(self, solver=replace(self.solver, intervals=_COARSE, integrator=finer))
 
     @cached_property
     def guess(self) -> tuple[np.ndarray, np.ndarray]:

@@ -32,13 +32,16 @@ def unreachable(subject: Subject) -> Iterator[Finding]:
     if any(r is None for r in rollouts):
         return
     (values, slopes), (other, other_slopes) = rollouts  # type: ignore[misc]
-    for n in _fixed(np.hstack([slopes, other_slopes])):
-        miss = float(n @ values)
-        scale = 1.0 + float(np.abs(values).max())
-        if abs(miss) <= _MISS * scale or abs(n @ (values - other)) > _MISS * scale:
-            continue
-        named = [rows[i] for i in np.flatnonzero(np.abs(n) > _SHARE)]
-        yield _finding(subject, named, n, miss)
+    both = np.hstack([slopes, other_slopes])
+    size = np.abs(both).max(axis=1)
+    size = np.where(size > _RANK * (1.0 + size.max()), size, 1.0)
+    kept = _kept(both / size[:, None])
+    miss, changed = kept @ (values / size), kept @ ((values - other) / size)
+    tolerance = _MISS * (1.0 + float(np.abs(values / size).max()))
+    if np.abs(miss).max() > tolerance and np.abs(changed).max() <= tolerance:
+        share = np.abs(miss) / np.abs(miss).max()
+        named = [rows[i] for i in np.flatnonzero(share > _SHARE)]
+        yield _finding(subject, named, float(np.abs(miss * size).max()))
 
 
 def _equations(subject: Subject) -> list[tuple[Constraint, ca.SX, float]]:
@@ -93,23 +96,15 @@ def _rollout(subject: Subject, rows: list, seed: int) -> tuple[np.ndarray, np.nd
     return value.ravel() - [target for *_, target in rows], np.hstack(columns)
 
 
-def _fixed(slopes: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield unit vectors n with n' slopes = 0, the ends scaled alike."""
-    size = np.abs(slopes).max(axis=1)
-    for i in np.flatnonzero(size <= _RANK * (1.0 + size.max())):
-        yield np.eye(len(size))[i]
-    moving = np.flatnonzero(size > _RANK * (1.0 + size.max()))
-    if not moving.size:
-        return
-    left, values, _ = np.linalg.svd(slopes[moving] / size[moving, None], full_matrices=True)
-    padded = np.append(values, np.zeros(len(moving) - len(values)))
-    for column in left.T[padded <= _RANK * padded[0]]:
-        n = np.zeros(len(size))
-        n[moving] = column / size[moving]
-        yield n / np.abs(n).max()
+def _kept(slopes: np.ndarray) -> np.ndarray:
+    """Return the projector onto the combinations of rows that have no slope, (m, m)."""
+    left, values, _ = np.linalg.svd(slopes, full_matrices=True)
+    padded = np.append(values, np.zeros(len(slopes) - len(values)))
+    null = left[:, padded <= _RANK * max(1.0, padded[0])]
+    return null @ null.T
 
 
-def _finding(subject: Subject, named: list, n: np.ndarray, miss: float) -> Finding:
+def _finding(subject: Subject, named: list, miss: float) -> Finding:
     states = [name for _, row, _ in named for name in appearing(subject.ocp, row)]
     names = tuple(dict.fromkeys([c.name for c, *_ in named] + states))
     alone = len(named) == 1
@@ -124,10 +119,10 @@ def _finding(subject: Subject, named: list, n: np.ndarray, miss: float) -> Findi
         Severity.ERROR,
         names,
         f"No control moves {what} ({', '.join(dict.fromkeys(states))}): whatever is done, it ends "
-        f"{abs(miss):.3g} {unit}".rstrip()
+        f"{miss:.3g} {unit}".rstrip()
         + " away from what is asked. Is a term missing in the "
         "dynamics, or does the model keep this quantity? Drop the constraint, or add an actuator.",
-        abs(miss),
+        miss,
         unit,
         subject.data.t0 + subject.ocp.duration,
     )
