@@ -19,7 +19,7 @@ _OPTIONS = {
     "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.max_iter": 150,
+    "ipopt.max_iter": 120,
 }
 
 

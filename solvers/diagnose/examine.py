@@ -40,18 +40,17 @@ _BEFORE: tuple[Check, ...] = (
     curvature,
     grid,
     duplicate,
-    scaling,
     kink,
     guess,
 )
 # What a trial solve shows.
-_AFTER: tuple[Check, ...] = (free_time, unbounded, infeasible, referee, activity)
+_AFTER: tuple[Check, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
 
 # Enough for a trial; a solve that needs more is reported as such.
 _ITERATIONS = 200
 
 
-def diagnose(asked: OCP | Solution, *, intervals: int = 75) -> Diagnosis:
+def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     """Say what is wrong with a problem, or with the problem behind a solution.
 
     Every check looks for one kind of mistake; what it finds names constraint, state or control,

@@ -5,18 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ocp import FreeTime, Signal, Solution, evaluate, solve
+from ocp import OCP, FreeTime, Signal, Solution, evaluate, solve
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.demands import along
 from solvers.diagnose.elastic import Demand, Elastic, Stretched
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import Subject
+from solvers.direct.multiple_shooting import MultipleShooting
 
 # How much longer the horizon may become when the shortest time is estimated.
 _LONGER = 50.0
 # Accepted violation between the nodes of such an estimate.
 _BETWEEN = 0.1
-_STEPS = (2, 4, 8)
+_MULTIPLES = (2, 4, 8)
 
 
 def infeasible(subject: Subject) -> Iterator[Finding]:
@@ -65,21 +66,31 @@ def _time_may_help(subject: Subject, elastic: Elastic, members: tuple[int, ...])
 def _shortest(subject: Subject) -> float | None:
     """Return a duration with which a trajectory exists [s], None if none was found.
 
-    In continuous time the shortest one; in discrete time the first of a few multiples.
+    The shortest one where that can be computed, else the first of a few multiples.
     """
-    ocp, solver = subject.ocp, subject.solver
-    if ocp.steps:
-        for factor in _STEPS:
-            if solve(replace(ocp, horizon=ocp.steps * factor), solver).status.is_success:
-                return ocp.duration * factor
-        return None
-    d = ocp.duration
-    longer = FreeTime(guess=3 * d, lower=d, upper=_LONGER * d)
-    quick = replace(ocp, horizon=longer, running_cost=1.0, terminal_cost=0.0)
-    found = solve(quick, solver)
-    # A grid lets a fast motion jump over what is narrow: the referee looks between the nodes.
-    real = found.status.is_success and evaluate(found, tolerance=1e-6).violation <= _BETWEEN
-    return found.duration if real else None
+    ocp, d = subject.ocp, subject.ocp.duration
+    if not ocp.model.is_discrete:
+        longer = FreeTime(guess=3 * d, lower=d, upper=_LONGER * d)
+        quick = replace(ocp, horizon=longer, running_cost=1.0, terminal_cost=0.0)
+        found = _feasible(quick, subject.solver)
+        if found is not None or ocp.has_free_time:
+            return found
+    for factor in _MULTIPLES:
+        found = _feasible(replace(ocp, horizon=factor * (ocp.steps or d)), subject.solver)
+        if found is not None:
+            return found
+    return None
+
+
+def _feasible(ocp: OCP, solver: MultipleShooting) -> float | None:
+    """Return the duration of a solution that the referee accepts [s], None if there is none.
+
+    A grid lets a fast motion jump over what is narrow: the referee looks between the nodes.
+    """
+    found = solve(ocp, solver)
+    if found.status.is_success and evaluate(found, tolerance=1e-6).violation <= _BETWEEN:
+        return found.duration
+    return None
 
 
 def _finding(

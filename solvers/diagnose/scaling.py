@@ -41,10 +41,10 @@ def _power(size: float) -> float:
 
 
 def _sizes(subject: Subject) -> np.ndarray:
-    """Return how large each state and control is: by its numbers, else by the first iterate.
+    """Return how large each state and control is: by its numbers, and along a solved trial.
 
-    What is small on the first iterate only may grow; it counts as 1. What is bounded tightly,
-    or starts small, is small.
+    A roll-out that nobody wanted says nothing about sizes. What is small along the trial only may
+    grow; it counts as 1. What is bounded tightly on both sides is small.
     """
     ocp, m = subject.ocp, subject.ocp.model
     boxes = [np.concatenate([getattr(b, s) for b in (ocp.state_bounds, ocp.control_bounds)])
@@ -52,8 +52,10 @@ def _sizes(subject: Subject) -> np.ndarray:
     start = np.concatenate([subject.data.x0, np.zeros(m.nu)])
     rows = np.abs(np.vstack([*boxes, start]))
     declared = np.where(np.isfinite(rows), rows, 0.0).max(axis=0)
-    along = np.abs(np.hstack([subject.along.x, subject.along.u])).max(axis=0)
-    seen = np.maximum(declared, np.where(np.isfinite(along), along, 0.0))
+    seen = declared
+    if subject.trial.status.is_success:
+        tried = np.abs(np.hstack([subject.tried.x, subject.tried.u])).max(axis=0)
+        seen = np.maximum(declared, tried)
     bounded = np.isfinite(boxes[0]) & np.isfinite(boxes[1]) & (declared > 0.0)
     return np.where(bounded, seen, np.maximum(seen, 1.0))
 
@@ -63,7 +65,8 @@ def _weights(subject: Subject, names: tuple[str, ...], sizes: np.ndarray) -> Ite
     z = ca.vertcat(m.x, m.u)
     gradient = ca.gradient(ca.SX(ocp.running_cost), z)
     bends = ca.vertcat(*[ca.jacobian(gradient[i], z[i]) for i in range(z.numel())])
-    values = subject.along.evaluate(ocp, bends)
+    points = subject.tried if subject.trial.status.is_success else subject.along
+    values = points.evaluate(ocp, bends)
     values = np.abs(values[np.isfinite(values).all(axis=1)]).max(axis=0, initial=0.0) * sizes**2
     there = np.flatnonzero(values > 0.0)
     if not there.size:

@@ -76,8 +76,14 @@ class Subject:
 
     @cached_property
     def guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """The first iterate: states with the free final time (N + 1, nz), controls (N, nu)."""
-        return self.program.first_iterate(self.data, self.ocp.guess)
+        """The first iterate: states with the free final time (N + 1, nz), controls (N, nu).
+
+        Clipped to the bounds, as the solver does it.
+        """
+        z, u = self.program.first_iterate(self.data, self.ocp.guess)
+        nx, start = self.ocp.model.nx, z[0].copy()
+        z = np.hstack([self.ocp.state_bounds.clip(z[:, :nx]), z[:, nx:]])
+        return np.vstack([start, z[1:]]), self.ocp.control_bounds.clip(u)
 
     @cached_property
     def trial(self) -> Solution:
