@@ -33,8 +33,9 @@ class Verdict:
         if isinstance(self.entry, Sound):
             return not self.diagnosis.serious
         first = self.diagnosis.first
-        found = first is not None and first.cause is self.entry.cause
-        return found and self.entry.symbol in first.where
+        if first is None or first.cause is not self.entry.cause:
+            return False
+        return self.entry.symbol in first.where
 
 
 def judged(entries: Sequence[Mistake | Sound]) -> Iterator[Verdict]:

@@ -18,7 +18,7 @@ def _problem(name: str, states: Units, controls: Units, sound: dict[str, Any], g
     A part may be a function of the symbols: states, controls, t and the names in ``data``.
     ``states`` and ``controls`` among the parts add symbols to those of the sound problem.
     """
-    parts = sound | given
+    parts: dict[str, Any] = sound | given
     states, controls = {**states, **parts.pop("states", {})}, {**controls, **parts.pop("more", {})}
     names = (*states, *controls, "t", *parts.pop("data", ()))
     s = SimpleNamespace(**{n: ca.SX.sym(n) for n in names})
@@ -34,7 +34,8 @@ def _problem(name: str, states: Units, controls: Units, sound: dict[str, Any], g
         x_units=tuple(states.values()) if units else (),
         u_units=tuple(controls.values()) if units else (),
     )
-    return OCP(**({"name": name, "model": model} | parts))
+    whole: dict[str, Any] = {"name": name, "model": model} | parts
+    return OCP(**whole)
 
 
 def ends(target: dict[str, float]) -> Any:

@@ -65,15 +65,14 @@ def of_constraint(subject: Subject, c: Constraint) -> Iterator[Asked]:
 def at_instant(subject: Subject, asked: list[Asked], t: float, fraction: float) -> Elastic:
     """Return the demands on (x, u) at one instant; x0 is not fixed."""
     ocp, m = subject.ocp, subject.ocp.model
-    p = subject.data.values.at(fraction)[0]
-    rows = ca.vertcat(*[row for _, row, _, _ in asked])
-    rows = ca.substitute(rows, ca.vertcat(m.t, ocp.p), ca.vertcat(t, ca.DM(p)))
-    free = np.full(m.nx + m.nu, np.inf)
+    stacked = ca.vertcat(*[row for _, row, _, _ in asked])
+    function = ca.Function("rows", [ca.vertcat(m.x, m.u), m.t, ocp.p], [ca.densify(stacked)])
+    w, free = ca.MX.sym("w", m.nx + m.nu), np.full(m.nx + m.nu, np.inf)
     return Elastic(
-        w=ca.vertcat(m.x, m.u),
-        p=ca.SX(0, 1),
-        hard=ca.SX(0, 1),
-        rows=rows,
+        w=w,
+        p=ca.MX(0, 1),
+        hard=ca.MX(0, 1),
+        rows=function(w, t, subject.data.values.at(fraction)[0]),
         lower=np.array([a[2] for a in asked]),
         upper=np.array([a[3] for a in asked]),
         owner=np.arange(len(asked)),

@@ -1,8 +1,10 @@
 """How far constraints must give way, and the fewest that exclude each other."""
 
 from collections.abc import Iterable
+from contextlib import redirect_stderr
 from dataclasses import dataclass
 from functools import cached_property
+from io import StringIO
 
 import casadi as ca
 import numpy as np
@@ -82,10 +84,10 @@ class Elastic:
         box: bounds of w that are never relaxed, two arrays.
     """
 
-    w: ca.MX | ca.SX
-    p: ca.MX | ca.SX
-    hard: ca.MX | ca.SX
-    rows: ca.MX | ca.SX
+    w: ca.MX
+    p: ca.MX
+    hard: ca.MX
+    rows: ca.MX
     lower: np.ndarray
     upper: np.ndarray
     owner: np.ndarray
@@ -98,9 +100,9 @@ class Elastic:
 
     @cached_property
     def _nlp(self) -> ca.Function:
-        s = type(self.w).sym("s", len(self.demands))
+        s = ca.MX.sym("s", len(self.demands))
         slack = s[[int(i) for i in self.owner]]
-        near = type(self.w).sym("near", self.w.numel())
+        near = ca.MX.sym("near", self.w.numel())
         apart = (self.w - near) / (1.0 + ca.fabs(near))
         nlp = {
             "x": ca.vertcat(self.w, s),
@@ -122,19 +124,26 @@ class Elastic:
         on = np.isin(self.owner, kept)
         gives = np.isin(np.arange(len(self.demands)), kept if soft is None else list(soft))
         many, zeros = np.full(len(on), np.inf), np.zeros(self.hard.numel())
-        answer = self._nlp(
-            x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
-            p=np.append(p, w0),
-            lbx=np.append(self.box[0], np.zeros(len(gives))),
-            ubx=np.append(self.box[1], np.where(gives, np.inf, 0.0)),
-            lbg=np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),
-            ubg=np.concatenate([zeros, many, np.where(on, self.upper, np.inf)]),
-        )
+        # CasADi warns of multipliers that are not finite, whatever its options say.
+        with redirect_stderr(StringIO()):
+            answer = self._nlp(
+                x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
+                p=np.append(p, w0),
+                lbx=np.append(self.box[0], np.zeros(len(gives))),
+                ubx=np.append(self.box[1], np.where(gives, np.inf, 0.0)),
+                lbg=np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),
+                ubg=np.concatenate([zeros, many, np.where(on, self.upper, np.inf)]),
+            )
         values, rows = np.array(answer["x"]).ravel(), self.rows.numel()
         weights = np.array(answer["lam_g"]).ravel()[self.hard.numel() :].reshape(2, rows)
-        found = bool(self._nlp.stats()["success"] and np.isfinite(values).all())
+        finite = np.isfinite(values).all() and np.isfinite(weights).all()
         split = len(values) - len(gives)
-        return Stretched(values[:split], values[split:], np.abs(weights).sum(axis=0), found)
+        return Stretched(
+            w=values[:split],
+            stretch=np.maximum(values[split:], 0.0),
+            weight=np.abs(weights).sum(axis=0),
+            found=bool(self._nlp.stats()["success"] and finite),
+        )
 
     def excess(self, answer: Stretched) -> np.ndarray:
         """Return by how much each demand gives way, relative to its size."""

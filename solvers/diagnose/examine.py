@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator
 
+import numpy as np
+
 from ocp import OCP, Data, ProblemError, Solution
 from solvers.diagnose.activity import activity
 from solvers.diagnose.cause import Cause
@@ -72,10 +74,11 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     if not isinstance(asked, OCP | Solution):
         raise ProblemError(f"diagnose takes an OCP or a Solution, not {type(asked).__name__}")
     subject = _subject(asked, MultipleShooting(intervals, max_iterations=_ITERATIONS))
-    findings = [finding for check in _BEFORE for finding in check(subject)]
-    if not any(f.severity is Severity.ERROR for f in findings):
-        findings += [finding for check in _AFTER for finding in check(subject)]
-        findings += _unsolved(subject, findings)
+    with np.errstate(all="ignore"):  # what is not finite is looked for, not warned of
+        findings = [finding for check in _BEFORE for finding in check(subject)]
+        if not any(f.severity is Severity.ERROR for f in findings):
+            findings += [finding for check in _AFTER for finding in check(subject)]
+            findings += _unsolved(subject, findings)
     return Diagnosis.of(subject.ocp.name, findings)
 
 

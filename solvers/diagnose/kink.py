@@ -79,8 +79,10 @@ def _on_switch(subject: Subject, switch: ca.SX) -> tuple[Points, np.ndarray] | N
         value = Points(z[:, : m.nx], z[:, m.nx :], *at).evaluate(ocp, switch)[0, 0]
         low, high = (low, middle) if value > 0.0 else (middle, high)
     z = (start + high * (end - start))[None, :]
-    direction = (end - start) / np.linalg.norm(end - start)
-    return Points(z[:, : m.nx], z[:, m.nx :], *at), direction
+    apart = float(np.linalg.norm(end - start))
+    if apart == 0.0:
+        return None
+    return Points(z[:, : m.nx], z[:, m.nx :], *at), (end - start) / apart
 
 
 def _shift(point: Points, by: np.ndarray, nx: int) -> Points:

@@ -93,7 +93,9 @@ def _rollout(subject: Subject, rows: list, seed: int) -> tuple[np.ndarray, np.nd
         columns.append(timed)
     if ocp.has_free_start:
         columns.append(answers)
-    return value.ravel() - [target for *_, target in rows], np.hstack(columns)
+    misses, answer = value.ravel() - [target for *_, target in rows], np.hstack(columns)
+    finite = np.isfinite(misses).all() and np.isfinite(answer).all()
+    return (misses, answer) if finite else None
 
 
 def _kept(slopes: np.ndarray) -> np.ndarray:
