@@ -22,7 +22,9 @@ def _run(options: Namespace, console: Console) -> int:
     verdicts = list(judged(entries))
     if options.say:
         for verdict in verdicts:
-            console.print(f"[{verdict.entry.name}] {verdict.diagnosis}", markup=False)
+            console.print(
+                f"[{verdict.entry.name}] {verdict.diagnosis}", markup=False, soft_wrap=True
+            )
     console.print(verdict_table(verdicts))
     console.print(summary_table(verdicts))
     wrong = [v for v in verdicts if isinstance(v.entry, Mistake)]

@@ -7,10 +7,10 @@ import numpy as np
 
 from ocp import OCP, FreeTime, Signal, Solution, evaluate, solve
 from solvers.diagnose.cause import Cause
-from solvers.diagnose.demands import along
 from solvers.diagnose.elastic import Demand, Elastic, Stretched
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import Subject
+from solvers.diagnose.trajectory import along
 from solvers.direct.multiple_shooting import MultipleShooting
 
 # How much longer the horizon may become when the shortest time is estimated.

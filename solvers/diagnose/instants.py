@@ -110,7 +110,7 @@ def _start(subject: Subject) -> Iterator[Finding]:
         return
     worst = int(elastic.excess(answer).argmax())
     demand, amount = elastic.demands[worst], float(answer.stretch[worst])
-    equation = fixed[worst][2] == fixed[worst][3]
+    equation = any(d == demand and low == high for d, _, low, high in fixed)
     advice = (
         "An equation on the whole path holds at the start too: was at='terminal' meant?"
         if equation
