@@ -56,46 +56,60 @@ def _equations(subject: Subject) -> list[tuple[Constraint, ca.SX, float]]:
 
 
 def _rollout(subject: Subject, rows: list, seed: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return psi - target (m,) and its derivative in all controls and a free duration."""
-    ocp, tr, m = subject.ocp, subject.program.transcription, subject.ocp.model
-    rng, n = np.random.default_rng(seed), tr.n
-    bounds = ocp.control_bounds
-    low, high = (
-        np.where(np.isfinite(b), b, d) for b, d in ((bounds.lower, -1.0), (bounds.upper, 1.0))
-    )
-    u = low + (high - low) * rng.uniform(size=(n, m.nu))
+    """Return psi - target (m,) under random controls, and its derivative in all that is free."""
+    ocp, n = subject.ocp, subject.program.transcription.n
+    u = _excited(subject, seed)
+    # A free duration is doubled once, so that what only time moves is seen to move.
     duration = ocp.duration * (1.0 + seed * float(ocp.has_free_time))
-    h = np.full((n, 1), duration / n)
-    t = subject.data.t0 + np.arange(n)[:, None] * h
-    left, right = subject.data.values.on(tr.fractions)
-    x = [subject.data.x0]
-    inputs = (t.T, h.T, left.T, right.T)
-    after = np.array(subject.program.rollout(x[0], u.T, *inputs)[0])
-    states = np.vstack([x[0], after.T])
+    h = np.full((1, n), duration / n)
+    t = subject.data.t0 + np.arange(n)[None, :] * h
+    left, right = subject.data.values.on(subject.program.transcription.fractions)
+    inputs = (t, h, left.T, right.T)
+    after = np.array(subject.program.rollout(subject.data.x0, u.T, *inputs)[0]).T
+    states = np.vstack([subject.data.x0, after])
     if not np.isfinite(states).all():
         return None
-    step = subject.program.transcription.step
-    slopes = step.factory(
-        "slopes", step.name_in(), ["jac:x_next:x", "jac:x_next:u0", "jac:x_next:h"]
-    ).map(n)
-    a, b, by_h = (np.array(v) for v in slopes(states[:-1].T, u.T, *inputs))
+    psi, psi_x = _end(subject, rows, states[-1], float(t[0, -1] + h[0, -1]))
+    slopes = _backwards(subject, psi_x, states[:-1], u, inputs)
+    misses = psi - [target for *_, target in rows]
+    finite = np.isfinite(misses).all() and np.isfinite(slopes).all()
+    return (misses, slopes) if finite else None
+
+
+def _excited(subject: Subject, seed: int) -> np.ndarray:
+    """Return random controls within their bounds, or within 1 where they have none, (N, nu)."""
+    bounds, rng = subject.ocp.control_bounds, np.random.default_rng(seed)
+    low = np.where(np.isfinite(bounds.lower), bounds.lower, -1.0)
+    high = np.where(np.isfinite(bounds.upper), bounds.upper, 1.0)
+    shape = (subject.program.transcription.n, subject.ocp.model.nu)
+    return low + (high - low) * rng.uniform(size=shape)
+
+
+def _end(subject: Subject, rows: list, x: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return psi (m,) and psi_x (m, nx) at the end."""
+    ocp, m = subject.ocp, subject.ocp.model
     psi = ca.vertcat(*[row for _, row, _ in rows])
-    p = subject.data.values.at(1.0)[0]
-    last = ca.Function("psi", [m.x, m.t, ocp.p], [psi, ca.densify(ca.jacobian(psi, m.x))])
-    value, psi_x = (np.array(v) for v in last(states[-1], t[-1] + h[-1], p))
-    # Backwards: how the ends answer to the state after each step, hence to its control.
-    answers, columns, timed = psi_x, [], np.zeros((len(rows), 1))
-    for k in range(n - 1, -1, -1):
-        columns.append(answers @ b[:, k * m.nu : (k + 1) * m.nu])
-        timed += answers @ by_h[:, [k]]
-        answers = answers @ a[:, k * m.nx : (k + 1) * m.nx]
-    if ocp.has_free_time:
-        columns.append(timed)
-    if ocp.has_free_start:
-        columns.append(answers)
-    misses, answer = value.ravel() - [target for *_, target in rows], np.hstack(columns)
-    finite = np.isfinite(misses).all() and np.isfinite(answer).all()
-    return (misses, answer) if finite else None
+    outputs = [ca.densify(psi), ca.densify(ca.jacobian(psi, m.x))]
+    last = ca.Function("psi", [m.x, m.t, ocp.p], outputs)
+    value, slope = last(x, t, subject.data.values.at(1.0)[0])
+    return np.array(value).ravel(), np.array(slope)
+
+
+def _backwards(
+    subject: Subject, psi_x: np.ndarray, x: np.ndarray, u: np.ndarray, inputs: tuple
+) -> np.ndarray:
+    """Return how the ends answer to every control, and to a free duration and start, (m, ...)."""
+    ocp, m, step = subject.ocp, subject.ocp.model, subject.program.transcription.step
+    names = ["jac:x_next:x", "jac:x_next:u0", "jac:x_next:h"]
+    slopes = step.factory("slopes", step.name_in(), names).map(len(u))
+    by_x, by_u, by_h = (np.array(v) for v in slopes(x.T, u.T, *inputs))
+    answers, columns, timed = psi_x, [], np.zeros((len(psi_x), 1))
+    for k in range(len(u) - 1, -1, -1):
+        columns.append(answers @ by_u[:, k * m.nu : (k + 1) * m.nu])
+        timed = timed + answers @ by_h[:, [k]]
+        answers = answers @ by_x[:, k * m.nx : (k + 1) * m.nx]
+    columns += [timed] * ocp.has_free_time + [answers] * ocp.has_free_start
+    return np.hstack(columns)
 
 
 def _kept(slopes: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ from benchmarks.mistakes import MISTAKES, SOUND
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.judge import GOAL, judged, share
 from ocp import Box, Euler, ProblemError, solve
-from solvers import Cause, Diagnosis, Finding, MultipleShooting, Severity, diagnose
+from solvers import Cause, Diagnosis, Finding, MultipleShooting, Severity, diagnose, polish
+from tests.ocp.problems import energy, lag, pendulum
 
 
 def finding(cause: Cause, severity: Severity = Severity.WARNING, name: str = "x") -> Finding:
@@ -73,6 +74,16 @@ def test_failed_solution():
     assert first is not None
     assert first.cause is Cause.CONFLICT
     assert "velocity" in first.where
+
+
+@pytest.mark.parametrize("build", [pendulum, lag, energy])
+def test_signals_time_and_discrete_time_are_no_mistakes(build):
+    assert not diagnose(build(), intervals=30).serious
+
+
+def test_extremal_solution():
+    direct = solve(energy(), MultipleShooting(30))
+    assert not diagnose(polish(direct), intervals=30).serious
 
 
 @pytest.mark.parametrize("wrong", [None, 3, "cart", of.cart])
