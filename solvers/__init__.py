@@ -6,6 +6,10 @@ from solvers.collocation.refined import Refinement, Round, refined
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.diagnosis import Diagnosis
+from solvers.diagnose.examine import diagnose
+from solvers.diagnose.finding import Finding, Severity
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.direct.stagewise_newton import StagewiseNewton
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
@@ -44,11 +48,14 @@ __all__ = [
     "Axis",
     "Batch",
     "BetweenNodes",
+    "Cause",
     "Collocation",
     "Damped",
+    "Diagnosis",
     "Enumeration",
     "Exact",
     "Filtered",
+    "Finding",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
@@ -77,11 +84,13 @@ __all__ = [
     "Schuetz",
     "SecondOrder",
     "SelfMotion",
+    "Severity",
     "StagewiseNewton",
     "StepRule",
     "Table",
     "Task",
     "descend",
+    "diagnose",
     "enumerate_extremals",
     "gpc_loop",
     "multistart",

@@ -104,7 +104,7 @@ class MultipleShootingProgram(Program):
         started = perf_counter()
         ocp = self.transcription.ocp
         data = Data.of(ocp, x0, t0, parameters)
-        z, u = self._first_iterate(data, guess or ocp.guess)
+        z, u = self.first_iterate(data, guess or ocp.guess)
         found = self.search.solve(self.transcription.join(z, u), data)
         return self._solution(data, found, perf_counter() - started)
 
@@ -116,8 +116,8 @@ class MultipleShootingProgram(Program):
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def _first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
-        """States and controls of the guess, a free final time with the states."""
+    def first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
+        """Return states and controls of the guess, a free final time with the states."""
         tr, ocp = self.transcription, self.transcription.ocp
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x, u = self.intervals.first_iterate(data, guess, duration)
