@@ -67,8 +67,8 @@ def _gap_claim(rows: Sequence[Row]) -> Claim | None:
 
 
 def _refinement_claim(coarse: Sequence[Row], fine: Sequence[Row]) -> Claim | None:
-    finer = {row.case: row for row in fine}
-    pairs = [(row, finer[row.case]) for row in coarse if row.case in finer]
+    finer = {row.setting: row for row in fine}
+    pairs = [(row, finer[row.setting]) for row in coarse if row.setting in finer]
     ratios = [_gap(b) / _gap(a) if a.solved and b.solved else float("inf") for a, b in pairs]
     if not ratios:
         return None
@@ -86,7 +86,7 @@ def _polish_claim(rows: Sequence[Row]) -> Claim | None:
     good = [
         row.status == "SOLVED"
         and abs(_gap(row)) <= 1e-6
-        and row.residual <= 1e-10
+        and _residual(row) <= 1e-10
         and row.iterations <= 3
         for row in rows
     ]
@@ -94,7 +94,7 @@ def _polish_claim(rows: Sequence[Row]) -> Claim | None:
         "polish: gap within 1e-6, residual <= 1e-10, at most 3 Newton steps, on all",
         all(good),
         f"{sum(good)} of {len(good)}; worst gap {max(abs(_gap(row)) for row in rows):.1e}, "
-        f"residual {max(row.residual for row in rows):.1e}, "
+        f"residual {max(map(_residual, rows)):.1e}, "
         f"steps {max(row.iterations for row in rows)}",
     )
 
@@ -135,3 +135,7 @@ def _multiple_claim(rows: Sequence[Row]) -> Claim | None:
 
 def _gap(row: Row) -> float:
     return row.gap if row.gap is not None and row.solved else float("inf")
+
+
+def _residual(row: Row) -> float:
+    return row.residual if row.residual is not None else float("inf")

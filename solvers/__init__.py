@@ -8,7 +8,12 @@ from solvers.collocation.refined import Refinement, Round, refined
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.diagnosis import Diagnosis
+from solvers.diagnose.examine import diagnose
+from solvers.diagnose.finding import Finding, Severity
 from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.direct.stagewise_newton import StagewiseNewton
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
@@ -45,15 +50,18 @@ __all__ = [
     "Axis",
     "Batch",
     "BetweenNodes",
+    "Cause",
     "Certificate",
     "Check",
     "Collocation",
     "Damped",
+    "Diagnosis",
     "Effort",
     "Enumeration",
     "Estimate",
     "Exact",
     "Filtered",
+    "Finding",
     "FixedStep",
     "GPCLaw",
     "GPCRun",
@@ -82,12 +90,15 @@ __all__ = [
     "Schuetz",
     "SecondOrder",
     "SelfMotion",
+    "Severity",
+    "StagewiseNewton",
     "StepRule",
     "Table",
     "Task",
     "Verdict",
     "certify",
     "descend",
+    "diagnose",
     "enumerate_extremals",
     "gpc_loop",
     "multistart",

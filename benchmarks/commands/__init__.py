@@ -7,12 +7,15 @@ from benchmarks.commands.command import Command
 from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, MPC
+from benchmarks.commands.mistakes import MISTAKES_COMMAND
+from benchmarks.commands.report import REPORT
 from benchmarks.commands.run import RUN
 from benchmarks.commands.speed import ARM_SPEED, SPEED
 
 COMMANDS: tuple[Command, ...] = (
     LIST,
     RUN,
+    REPORT,
     BENCH,
     CERTIFY,
     FIGURES_COMMAND,
@@ -22,6 +25,7 @@ COMMANDS: tuple[Command, ...] = (
     CLEAR,
     MPC,
     FAULTS,
+    MISTAKES_COMMAND,
 )
 
 __all__ = ["COMMANDS", "Command"]

@@ -20,7 +20,7 @@ def goddard(*, fastest: float = np.inf) -> OCP:
         0 \le u \le 3.5, \quad (r, v, m): (1, 0, 1) \to (\cdot, \cdot, 0.6)
 
     In units of the planet's radius, its gravity and the mass at the start. Optimum: without a
-    limit -1.0128386 (full thrust, a singular arc, none); with v <= 0.1 -1.0125775 (full thrust,
+    limit -1.0128369 (full thrust, a singular arc, none); with v <= 0.1 -1.0125763 (full thrust,
     singular, along the limit, none). Problem: [Bryson & Ho 1975]; [Dolan, More & Munson 2004].
 
     Args:

@@ -14,7 +14,10 @@ def catalyst_mixing() -> OCP:
         \dot x_2 = u (x_1 - 10 x_2) - (1 - u) x_2, \; 0 \le u \le 1, \quad x(0) = (1, 0)
 
     Optimum: -0.0480557; bang, singular, bang: u = 1 until 0.1363, 0.2271 on the singular arc, 0
-    from 0.7253 on. Problem: [Dolan, More & Munson 2004].
+    from 0.7252 on. The problem is linear in x at a given u: only the ratio x_2/x_1 matters, a
+    singular arc rests at one ratio, so u is constant on it, and the cost follows from the
+    exponentials of three matrices, least over the two switches and that u. Problem:
+    [Dolan, More & Munson 2004].
     """
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
     first = u * (10.0 * x[1] - x[0])
@@ -36,7 +39,8 @@ def two_catalysts() -> OCP:
         \min -c(4), \quad \dot a = -u (a - 10 b), \; \dot b = u (a - 10 b) - (1 - u) b, \;
         \dot c = (1 - u) b, \; 0 \le u \le 1, \quad (a, b, c)(0) = (1, 0, 0)
 
-    Optimum: bang, singular, bang. Problem: [Jackson 1968].
+    Optimum: -0.1918144; bang, singular, bang as in ``catalyst_mixing``, with the same singular
+    control and the same first and last arcs. Problem: [Jackson 1968].
     """
     a, b, c, u = (ca.SX.sym(name) for name in ("a", "b", "c", "u"))
     forth = u * (a - 10.0 * b)

@@ -17,7 +17,7 @@ def linear_tangent_steering() -> OCP:
         \min T, \quad \ddot x = a \cos\theta, \; \ddot y = a \sin\theta, \quad
         x, y, \dot x, \dot y: 0 \to (\cdot, 5, 45, 0)
 
-    a = 100, |θ| <= π/2. Optimum: T = 0.5545709. The costate of the vertical speed is linear
+    a = 100, -π/2 <= θ <= π/2. Optimum: T = 0.5545709. The costate of the vertical speed is linear
     in time and that of the horizontal speed constant: tan θ = tan θ_0 (1 - 2t/T), antisymmetric
     because the vertical speed returns to 0. With τ = tan θ_0 and σ = asinh τ,
 

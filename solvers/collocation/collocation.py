@@ -130,7 +130,7 @@ class CollocationProgram(Program):
     ) -> Solution:
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started, ocp = perf_counter(), self.transcription.ocp
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         first = self._first_iterate(data, guess or ocp.guess)
         found = self.search.solve(first.joined(), data)
         return self._solution(data, found, perf_counter() - started)

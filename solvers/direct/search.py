@@ -136,7 +136,8 @@ class Search:
         if answer.success and not violated:
             excess, row = start_violation(self.transcription.ocp, data)
             if excess > _VIOLATED:
-                return Status.INFEASIBLE, self._where(answer, data, excess, row)
+                where = self._where(answer, data, excess, row)
+                return Status.INFEASIBLE, f"{where}, by the given start itself"
             error, node = self.error(answer, data)
             if error <= self.accuracy:
                 return Status.SOLVED, ""

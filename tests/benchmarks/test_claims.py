@@ -20,7 +20,8 @@ def row(**changes) -> Row:
         suite="arm", case=CASE.name, solver="direct-75", settings="", starts=1, seed=0,
         status="SOLVED", message="", solved=True, optimum=True, cost=1.0, reference=1.0, lower=1.0,
         gap=1e-4, local_gap=1e-9, violation=0.0, worst="", stationarity=0.0, task_drift=0.0,
-        residual=1e-12, iterations=2, rollouts=1, jacobians=1, factorisations=1, build_time=0.1, solve_time=0.1,
+        residual=1e-12, iterations=2, rollouts=1, jacobians=1, factorisations=1,
+        build_time=0.1, solve_time=0.1, states=3, controls=1, intervals=75, when="",
         versions={}, machine={},
     )  # fmt: skip
     return replace(good, **changes)

@@ -19,7 +19,7 @@ from ocp import (
     elevated,
     evaluate,
 )
-from ocp.mpc.shift import controls, shifted
+from ocp.mpc.shift import Shifted, controls
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, pendulum, trajectory
 from tests.tolerances import MINIMISER, REFEREE, ROUNDING, STATIONARY
@@ -146,12 +146,9 @@ def test_a_control_within_its_bounds_violates_nothing() -> None:
 
 
 def test_shifted_plan_keeps_its_controls() -> None:
-    """Rows of a guess are equally spaced, the nodes of the plan are not."""
-    plan = curved()
-    guess = shifted(plan, 0.3)
-    times = 0.3 + np.linspace(0.0, DURATION, len(T))
-    assert guess.u is not None
-    np.testing.assert_array_equal(np.asarray(guess.u), plan.control(times))
+    plan, fractions = curved(), np.linspace(0.0, 1.0, 9)
+    u = Shifted(plan, 0.3).sample("u", fractions, plan.problem.model.nu)
+    np.testing.assert_array_equal(u, plan.control(0.3 + fractions * DURATION))
 
 
 def test_on_disk_with_and_without_breaks(tmp_path: Path) -> None:

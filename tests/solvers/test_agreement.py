@@ -13,7 +13,7 @@ from models import (
     van_der_pol,
 )
 from ocp import Program, Solver, Status, evaluate, solve
-from solvers import IndirectShooting, MultipleShooting, polish
+from solvers import Collocation, IndirectShooting, MultipleShooting, polish
 from tests.tolerances import (
     CERTIFIED,
     COST_DERIVATIVE,
@@ -100,6 +100,8 @@ def test_certified_optima(name: str, intervals: int) -> None:
     [
         MultipleShooting(150),
         MultipleShooting(150, backend="fatrop"),
+        Collocation(3, 3),
+        Collocation(3, 3, points="gauss"),
         IndirectShooting(),
         IndirectShooting(segments=15),
         IndirectShooting(jacobian="finite-difference"),
@@ -111,11 +113,7 @@ def test_least_energy_is_six(solver: Solver) -> None:
     # u held on N intervals: the optimum is 6 N^2/(N^2 - 1).
     exact = 6.0 * 150**2 / (150**2 - 1) if isinstance(solver, MultipleShooting) else 6.0
     assert evaluate(solution).cost == pytest.approx(exact, rel=CERTIFIED)
-    t = (
-        solution.t
-        if solution.control_kind == "extremal"
-        else (solution.t[1:] + solution.t[:-1]) / 2
-    )
+    t = (solution.t[1:] + solution.t[:-1]) / 2 if solution.control_kind == "held" else solution.t
     np.testing.assert_allclose(solution.control(t)[:, 0], 6.0 - 12.0 * t, atol=DIRECT_COSTATE)
     np.testing.assert_allclose(solution.costate[0], [-12.0, -6.0], rtol=DIRECT_COSTATE)
 

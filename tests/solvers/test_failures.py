@@ -24,17 +24,21 @@ from ocp import (
 )
 from solvers import (
     Armijo,
+    Collocation,
     FixedStep,
     HorizonContinuation,
     IndirectShooting,
     MultipleShooting,
     Schuetz,
+    StagewiseNewton,
 )
 from tests.solvers.problems import changed, ends, moving, point
 
-DIRECT = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
+SHOOTING = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
+DIRECT = (*SHOOTING, Collocation(10, 3), Collocation(10, 3, points="gauss"))
 ALL = (
     *DIRECT,
+    StagewiseNewton(20),
     IndirectShooting(),
     IndirectShooting(damped=False),
     IndirectShooting(segments=5, steps=50, jacobian="finite-difference"),
@@ -44,7 +48,9 @@ ALL = (
     Schuetz(step=FixedStep(1e3), stop_on_rise=False),
     Schuetz(gradient="discrete", step=Armijo(most=2)),
 )
-direct = pytest.mark.parametrize("solver", DIRECT, ids=lambda s: s.backend)
+direct = pytest.mark.parametrize(
+    "solver", DIRECT, ids=lambda s: getattr(s, "backend", "") or s.points
+)
 every = pytest.mark.parametrize("solver", ALL, ids=repr)
 
 
@@ -126,12 +132,33 @@ def test_infeasible_names_constraint_and_time(name: str, solver: Solver) -> None
     make, constraint, when = INFEASIBLE[name]
     solution = solve(make(), solver)
     assert solution.status is Status.INFEASIBLE
-    match = re.fullmatch(r"'(.*)' is violated by (\S+) at t = (\S+) s", solution.message)
+    match = re.fullmatch(
+        r"'(.*)' is violated by (\S+) at t = (\S+) s(, by the given start itself)?",
+        solution.message,
+    )
     assert match, solution.message
     assert re.fullmatch(constraint, match[1])
     assert float(match[2]) > 0.1
     assert float(match[3]) == pytest.approx(when, abs=0.051)
+    assert bool(match[4]) == name.startswith("x0 violates")
     stands_behind_nothing(solution)
+
+
+@direct
+def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(solver: Solver) -> None:
+    """A start that is given is no unknown: from the first step on the answer is an optimum."""
+    ocp = point(control_bounds=Box(-2.0, 2.0), state_bounds=Box(-0.2, 0.2))
+    program = solver.build(ocp)
+    outside = program.run(x0=[0.25])
+    assert outside.status is Status.INFEASIBLE
+    assert (
+        outside.message == "'bound of x' is violated by 0.05 at t = 0 s, by the given start itself"
+    )
+    assert ocp.state_bounds.excess(outside.x[1:]).max() < 1e-8
+    verdict = evaluate(outside)
+    assert verdict.violation == pytest.approx(0.05)
+    assert verdict.worst == "state x at t = 0 s"
+    assert program.run(x0=[0.2]).status is Status.SOLVED
 
 
 def test_more_terminal_equations_than_states() -> None:

@@ -81,7 +81,7 @@ SMOOTH_PROBLEMS = (
     entry(
         linear_tangent_steering,
         "linear-tangent-steering",
-        root(0.554570878337, "two equations for the first angle and the time"),
+        root(0.554570878335, "two equations for the first angle and the time"),
         ("direct", "indirect"),
         "smooth",
         DOLAN,

@@ -1,0 +1,1 @@
+"""Say what is wrong with a problem: one check a file, each naming what it found."""

@@ -1,0 +1,80 @@
+"""What bounds and constraints demand, and the elastic problem of one instant."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+
+from ocp import Constraint
+from solvers.diagnose.elastic import Demand, Elastic
+from solvers.diagnose.graph import appearing
+from solvers.diagnose.subject import Subject
+
+Asked = tuple[Demand, ca.SX, float, float]
+
+
+def size(*numbers: float) -> float:
+    """Return how large a demand is: its largest finite number, or 1."""
+    finite = [abs(v) for v in numbers if np.isfinite(v) and v != 0.0]
+    return max(finite, default=1.0)
+
+
+def of_box(subject: Subject, kind: Literal["state", "control"]) -> Iterator[Asked]:
+    """Yield every finite bound; those of one control are one demand, those of a state two.
+
+    A control that is too weak is so in both directions; of a state one side stands in the way.
+    """
+    ocp, m = subject.ocp, subject.ocp.model
+    is_control = kind == "control"
+    box, symbols = (ocp.control_bounds, m.u) if is_control else (ocp.state_bounds, m.x)
+    names = m.u_names if is_control else m.x_names
+    for i, name in enumerate(names):
+        lower, upper = float(np.asarray(box.lower)[i]), float(np.asarray(box.upper)[i])
+        for side, low, high in (("lower", lower, np.inf), ("upper", -np.inf, upper)):
+            number = low if side == "lower" else high
+            if not np.isfinite(number):
+                continue
+            label = f"the {side} bound {number:g} of {name}"
+            if is_control:
+                label = f"the box [{lower:g}, {upper:g}] of {name}"
+            unit, large = subject.unit(name), size(lower, upper)
+            yield Demand((name,), label, unit, large, is_control), symbols[i], low, high
+
+
+def of_constraint(subject: Subject, c: Constraint) -> Iterator[Asked]:
+    """Yield every row of a constraint."""
+    for i, (row, low, high) in enumerate(
+        zip(ca.vertsplit(c.expression), np.asarray(c.lower), np.asarray(c.upper), strict=True)
+    ):
+        names = appearing(subject.ocp, row)
+        which = f" (row {i}, {names[0] if len(names) == 1 else 'several'})" if c.size > 1 else ""
+        unit = subject.unit(names[0]) if row.is_symbolic() else ""
+        where = (c.name, *names) if row.is_symbolic() else (c.name,)
+        label = f"the {c.at} constraint '{c.name}'{which}"
+        yield (
+            Demand(where, label, unit, size(float(low), float(high))),
+            row,
+            float(low),
+            float(high),
+        )
+
+
+def at_instant(subject: Subject, asked: list[Asked], t: float, fraction: float) -> Elastic:
+    """Return the demands on (x, u) at one instant; x0 is not fixed."""
+    ocp, m = subject.ocp, subject.ocp.model
+    stacked = ca.vertcat(*[row for _, row, _, _ in asked])
+    function = ca.Function("rows", [ca.vertcat(m.x, m.u), m.t, ocp.p], [ca.densify(stacked)])
+    demands = tuple(dict.fromkeys(demand for demand, *_ in asked))
+    w, free = ca.MX.sym("w", m.nx + m.nu), np.full(m.nx + m.nu, np.inf)
+    return Elastic(
+        w=w,
+        p=ca.MX(0, 1),
+        hard=ca.MX(0, 1),
+        rows=function(w, t, subject.data.values.at(fraction)[0]),
+        lower=np.array([a[2] for a in asked]),
+        upper=np.array([a[3] for a in asked]),
+        owner=np.array([demands.index(demand) for demand, *_ in asked]),
+        demands=demands,
+        box=(-free, free),
+    )

@@ -1,0 +1,84 @@
+"""Quantities and weights of very different size."""
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.subject import Subject
+
+# Beyond these ratios an interior-point method loses its digits.
+_SIZES, _WEIGHTS = 1e5, 1e10
+
+
+def scaling(subject: Subject) -> Iterator[Finding]:
+    """Compare the sizes of states and controls, and what a typical step of each costs."""
+    m = subject.ocp.model
+    names, sizes = (*m.x_names, *m.u_names), _sizes(subject)
+    large, small = int(sizes.argmax()), int(sizes.argmin())
+    if sizes[large] > _SIZES * sizes[small]:
+        yield Finding(
+            Cause.BAD_SCALING,
+            Severity.WARNING,
+            (names[large], names[small]),
+            f"{_sized(subject, names[large], sizes[large])} beside "
+            f"{_sized(subject, names[small], sizes[small])}: choose units in which both are near "
+            f"1, that is divide {names[large]} by {_power(sizes[large]):.0e} and {names[small]} "
+            f"by {_power(sizes[small]):.0e}.",
+            float(sizes[large] / sizes[small]),
+        )
+    yield from _weights(subject, names, sizes)
+
+
+def _sized(subject: Subject, name: str, size: float) -> str:
+    return f"{name} is of size {size:.2g} {subject.unit(name)}".rstrip()
+
+
+def _power(size: float) -> float:
+    return 10.0 ** np.round(np.log10(size))
+
+
+def _sizes(subject: Subject) -> np.ndarray:
+    """Return how large each state and control is: by its numbers, and along a solved trial.
+
+    A roll-out that nobody wanted says nothing about sizes. What is small along the trial only may
+    grow; it counts as 1. What is bounded tightly on both sides is small.
+    """
+    ocp, m = subject.ocp, subject.ocp.model
+    boxes = [np.concatenate([getattr(b, s) for b in (ocp.state_bounds, ocp.control_bounds)])
+             for s in ("lower", "upper")]  # fmt: skip
+    start = np.concatenate([subject.data.x0, np.zeros(m.nu)])
+    rows = np.abs(np.vstack([*boxes, start]))
+    declared = np.where(np.isfinite(rows), rows, 0.0).max(axis=0)
+    seen = declared
+    if subject.trial.status.is_success:
+        tried = np.abs(np.hstack([subject.tried.x, subject.tried.u])).max(axis=0)
+        seen = np.maximum(declared, tried)
+    bounded = np.isfinite(boxes[0]) & np.isfinite(boxes[1]) & (declared > 0.0)
+    return np.where(bounded, seen, np.maximum(seen, 1.0))
+
+
+def _weights(subject: Subject, names: tuple[str, ...], sizes: np.ndarray) -> Iterator[Finding]:
+    ocp, m = subject.ocp, subject.ocp.model
+    z = ca.vertcat(m.x, m.u)
+    gradient = ca.gradient(ca.SX(ocp.running_cost), z)
+    bends = ca.vertcat(*[ca.jacobian(gradient[i], z[i]) for i in range(z.numel())])
+    points = subject.tried if subject.trial.status.is_success else subject.along
+    values = points.evaluate(ocp, bends)
+    values = np.abs(values[np.isfinite(values).all(axis=1)]).max(axis=0, initial=0.0) * sizes**2
+    there = np.flatnonzero(values > 0.0)
+    if not there.size:
+        return
+    large, small = there[values[there].argmax()], there[values[there].argmin()]
+    if values[large] > _WEIGHTS * values[small]:
+        yield Finding(
+            Cause.BAD_SCALING,
+            Severity.WARNING,
+            (names[large], names[small]),
+            f"A typical {names[large]} costs {values[large] / values[small]:.1e} times what a "
+            f"typical {names[small]} costs: the smaller is lost in rounding. Bring the weights "
+            "closer, or make the dear one a constraint.",
+            float(values[large] / values[small]),
+        )

@@ -1,0 +1,139 @@
+"""A problem under examination, with what several checks need, computed once."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from ocp import OCP, Data, Solution
+from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
+
+# Random points around the guess, for what must hold wherever one looks.
+_RANDOM = 20
+# Intervals of the elastic problem, which is solved a dozen times.
+_COARSE = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Where functions are evaluated: K rows of each argument.
+
+    Attributes:
+        x: states (K, nx).
+        u: controls (K, nu).
+        t: instants [s], (K,).
+        p: parameters (K, n_p).
+    """
+
+    x: np.ndarray
+    u: np.ndarray
+    t: np.ndarray
+    p: np.ndarray
+
+    def evaluate(self, ocp: OCP, expression: ca.SX) -> np.ndarray:
+        """Return an expression at every point, (K, numel)."""
+        m, value = ocp.model, ca.densify(ca.vec(expression))
+        function = ca.Function("value", [m.x, m.u, m.t, ocp.p], [value])
+        found = function.map(len(self.t))(self.x.T, self.u.T, self.t[None, :], self.p.T)
+        return np.array(found).reshape(value.numel(), len(self.t), order="F").T
+
+    def __add__(self, other: "Points") -> "Points":
+        """Return both."""
+        pairs = [(getattr(self, n), getattr(other, n)) for n in ("x", "u", "t", "p")]
+        return Points(*[np.concatenate(pair) for pair in pairs])
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A problem under examination.
+
+    Attributes:
+        ocp: the problem.
+        data: start, initial time and parameters of the run.
+        solver: the direct method that tries it.
+        given: the solution that was asked about, if any.
+    """
+
+    ocp: OCP
+    data: Data
+    solver: MultipleShooting
+    given: Solution | None = None
+
+    @cached_property
+    def program(self) -> MultipleShootingProgram:
+        """The problem, built."""
+        return self.solver.build(self.ocp)
+
+    @cached_property
+    def coarse(self) -> "Subject":
+        """The same on fewer intervals with more steps in each, where many solves are needed."""
+        if self.ocp.steps or self.solver.intervals <= _COARSE:
+            return self
+        steps = -(-self.solver.intervals * self.solver.integrator.steps // _COARSE)
+        finer = replace(self.solver.integrator, steps=steps)
+        return replace(self, solver=replace(self.solver, intervals=_COARSE, integrator=finer))
+
+    @cached_property
+    def guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """The first iterate: states with the free final time (N + 1, nz), controls (N, nu).
+
+        Clipped to the bounds, as the solver does it.
+        """
+        z, u = self.program.first_iterate(self.data, self.ocp.guess)
+        nx, start = self.ocp.model.nx, z[0].copy()
+        z = np.hstack([self.ocp.state_bounds.clip(z[:, :nx]), z[:, nx:]])
+        return np.vstack([start, z[1:]]), self.ocp.control_bounds.clip(u)
+
+    @cached_property
+    def trial(self) -> Solution:
+        """What the direct method makes of it."""
+        guess = self.given if self.given is not None and self.given.status.is_success else None
+        values = self.data.values.as_dict()
+        return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)
+
+    @cached_property
+    def along(self) -> Points:
+        """The nodes of the first iterate; the last control is held at the end."""
+        z, u = self.guess
+        fractions = self.program.transcription.fractions
+        duration = z[0, -1] if self.ocp.has_free_time else self.ocp.duration
+        return self._points(z[:, : self.ocp.model.nx], u, fractions, duration)
+
+    @cached_property
+    def tried(self) -> Points:
+        """The nodes of the trial."""
+        s = self.trial
+        return self._points(s.x, s.u, s.fractions, s.duration)
+
+    def _points(
+        self, x: np.ndarray, u: np.ndarray, fractions: np.ndarray, duration: float
+    ) -> Points:
+        t = self.data.t0 + fractions * duration
+        return Points(x, np.vstack([u, u[-1:]]), t, self.data.values.at(fractions))
+
+    @cached_property
+    def around(self) -> Points:
+        """Random points within the bounds, or around the first iterate where there are none."""
+        rng, near = np.random.default_rng(0), self.along
+        rows = rng.integers(len(near.t), size=_RANDOM)
+        ocp = self.ocp
+
+        def scattered(values: np.ndarray) -> np.ndarray:
+            size = 1.0 + np.abs(near_of(values)).max(axis=0)
+            return values[rows] + rng.normal(size=(_RANDOM, values.shape[1])) * size
+
+        def near_of(values: np.ndarray) -> np.ndarray:
+            return np.where(np.isfinite(values), values, 0.0)
+
+        x = ocp.state_bounds.clip(scattered(near.x))
+        u = ocp.control_bounds.clip(scattered(near.u))
+        return Points(x, u, near.t[rows], near.p[rows])
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a state or control; empty where none was declared."""
+        m = self.ocp.model
+        for names, units in ((m.x_names, m.x_units), (m.u_names, m.u_units)):
+            if name in names and units:
+                return units[names.index(name)]
+        return "s" if name == "final time" else ""

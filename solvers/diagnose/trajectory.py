@@ -1,0 +1,81 @@
+"""The elastic problem of the whole trajectory."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from solvers.diagnose.demands import of_box, of_constraint
+from solvers.diagnose.elastic import Demand, Elastic
+from solvers.diagnose.subject import Subject
+
+# Rows that hold whatever else gives way.
+_HARD = ("dynamics", "time")
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One row: its demand, its place in (g, w), its node, its bounds."""
+
+    demand: Demand
+    index: int
+    node: int
+    lower: float
+    upper: float
+
+
+def along(subject: Subject) -> tuple[Elastic, np.ndarray]:
+    """Return the demands along the whole trajectory, and the node of every row."""
+    tr = subject.program.transcription
+    program, bounds = tr.program, tr.bounds(subject.data)
+    boxed = list(_boxed(subject))
+    rows = [*_constrained(subject), *boxed]
+    box = (bounds["lbx"].copy(), bounds["ubx"].copy())
+    relaxed = [row.index - len(tr.rows) for row in boxed]
+    box[0][relaxed], box[1][relaxed] = -np.inf, np.inf
+    demands = tuple(dict.fromkeys(row.demand for row in rows))
+    hard = [i for i, row in enumerate(tr.rows) if row.place in _HARD]
+    elastic = Elastic(
+        w=program["x"],
+        p=program["p"],
+        hard=program["g"][hard],
+        rows=ca.vertcat(program["g"], program["x"])[[row.index for row in rows]],
+        lower=np.array([row.lower for row in rows]),
+        upper=np.array([row.upper for row in rows]),
+        owner=np.array([demands.index(row.demand) for row in rows]),
+        demands=demands,
+        box=box,
+    )
+    return elastic, np.array([row.node for row in rows])
+
+
+def _boxed(subject: Subject) -> Iterator[_Row]:
+    """Yield the bounds of states and controls at every node; a given start is not relaxed."""
+    ocp, tr = subject.ocp, subject.program.transcription
+    m, width, count = ocp.model, tr.nz + ocp.model.nu, len(tr.rows)
+    columns = {e.element_hash(): i for i, e in enumerate(ca.vertsplit(m.x))}
+    columns |= {e.element_hash(): tr.nz + i for i, e in enumerate(ca.vertsplit(m.u))}
+    for demand, symbol, lower, upper in (*of_box(subject, "state"), *of_box(subject, "control")):
+        column = columns[symbol.element_hash()]
+        given = column < m.nx and not ocp.has_free_start
+        for j in range(column + width * given, tr.size, width):
+            yield _Row(demand, count + j, j // width, lower, upper)
+
+
+def _constrained(subject: Subject) -> Iterator[_Row]:
+    """Yield the rows of the constraints, in the order of the program."""
+    ocp, tr = subject.ocp, subject.program.transcription
+    given = {
+        place: [demand for c in ocp.at(place) for demand, *_ in of_constraint(subject, c)]
+        for place in ("path", "initial", "terminal")
+    }
+    on_control = ocp.functions.path_on_control
+    late = [d for d, depends in zip(given["path"], on_control, strict=True) if not depends]
+    counted: dict[tuple[str, int], int] = {}
+    for i, row in enumerate(tr.rows):
+        if row.place not in _HARD:
+            which = counted.get((row.place, row.node), 0)
+            counted[row.place, row.node] = which + 1
+            here = late if row.place == "path" and row.node == tr.n else given[row.place]
+            yield _Row(here[which], i, row.node, row.lower, row.upper)

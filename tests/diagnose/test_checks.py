@@ -1,0 +1,314 @@
+"""Every check on a small problem whose numbers can be worked out by hand."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from benchmarks.mistakes import problems as of
+from ocp import OCP, Box, Constraint, Data, FreeTime, Guess, Model
+from solvers import Cause, MultipleShooting, Severity, diagnose
+from solvers.diagnose.curvature import curvature
+from solvers.diagnose.degrees import degrees
+from solvers.diagnose.duplicate import duplicate
+from solvers.diagnose.elastic import Demand, Elastic
+from solvers.diagnose.examine import _BEFORE
+from solvers.diagnose.finding import Finding
+from solvers.diagnose.grid import grid
+from solvers.diagnose.guess import guess
+from solvers.diagnose.influence import influence
+from solvers.diagnose.instants import instants
+from solvers.diagnose.kink import kink
+from solvers.diagnose.not_finite import not_finite
+from solvers.diagnose.scaling import scaling
+from solvers.diagnose.subject import Subject
+from solvers.diagnose.time_kind import time_kind
+from solvers.diagnose.unbounded import unbounded
+from solvers.diagnose.unreachable import unreachable
+from solvers.diagnose.vacuous import vacuous
+from tests.tolerances import MINIMISER
+
+# What the elastic problem leaves over: IPOPT's 1e-8, and the weight of its tie break.
+ELASTIC = 1e-3
+
+
+def subject(ocp: OCP, intervals: int = 20) -> Subject:
+    data = Data(ocp.start(), 0.0, ocp.parameter_values())
+    return Subject(ocp, data, MultipleShooting(intervals))
+
+
+def only(check, ocp: OCP) -> Finding:
+    (finding,) = check(subject(ocp))
+    return finding
+
+
+@pytest.mark.parametrize("build", [of.cart, of.lander, of.car, of.regulator, of.arm])
+def test_silent_where_nothing_is_wrong(build):
+    sound = subject(build())
+    assert [finding for check in _BEFORE for finding in check(sound)] == []
+
+
+def test_logarithm_names_state_and_instant():
+    """The level falls by 0.5 m/s from 1 m: its logarithm ends at t = 2 s."""
+    ocp = of.tank(
+        f=lambda s: (s.inflow - 0.5,),
+        state_bounds=Box(),
+        running_cost=lambda s: ca.log(s.level) ** 2 + 0.1 * s.inflow**2,
+    )
+    found = only(not_finite, ocp)
+    assert (found.cause, found.where) == (Cause.NOT_FINITE, ("level",))
+    assert found.instant == pytest.approx(2.0)
+    assert "logarithm of level" in found.sentence
+
+
+def test_slope_of_a_root_is_looked_at_too():
+    found = list(not_finite(subject(of.tank(x0=[0.0], state_bounds=Box(0.0, 10.0)))))
+    assert found[0].where == ("level",)
+    assert found[0].instant == 0.0
+
+
+def test_degrees_in_the_cost_without_units():
+    wanted = {"terminal_cost": lambda s: 10 * (s.angle - 180) ** 2, "units": False}
+    found = only(degrees, of.pendulum(**wanted))
+    assert found.evidence == pytest.approx(180.0)
+    assert "3.14159" in found.sentence
+
+
+def test_radians_are_not_taken_for_degrees():
+    assert not list(degrees(subject(of.pendulum(constraints=of.ends({"angle": 4 * np.pi})))))
+
+
+def test_rate_for_a_next_state_and_back():
+    assert only(time_kind, of.cart(dt=0.05, horizon=40)).cause is Cause.TIME_KIND
+    sampled = of.regulator(dt=None, horizon=4.0)
+    assert only(time_kind, sampled).cause is Cause.TIME_KIND
+
+
+def test_constraint_without_a_bound():
+    ocp = of.cart(constraints=lambda s: (Constraint("speed", s.velocity),))
+    assert only(vacuous, ocp).where == ("speed",)
+
+
+def test_start_that_violates_by_two_kelvin():
+    ocp = of.room(
+        x0=[18.0],
+        state_bounds=Box(),
+        constraints=lambda s: (Constraint("comfort", s.warmth, 20.0, 24.0),),
+    )
+    found = only(instants, ocp)
+    assert found.cause is Cause.START_VIOLATES
+    assert found.evidence == pytest.approx(2.0, abs=ELASTIC)
+    assert found.unit == "degC"
+
+
+def test_target_beyond_the_arm():
+    """The hand reaches 2 m; L1 over the rows moves the target along one axis."""
+    found = only(instants, of.arm(constraints=of.reach((3.0, 0.0))))
+    assert found.cause is Cause.CONTRADICTION
+    assert found.where == ("target",)
+    assert found.evidence == pytest.approx(1.0, abs=1e-2)
+
+
+def test_contradiction_names_both_sides():
+    ocp = of.cart(
+        constraints=of.ends({"position": 1.0, "velocity": 3.0}),
+        state_bounds=Box([-np.inf, -2.0], [np.inf, 2.0]),
+    )
+    found = only(instants, ocp)
+    assert set(found.where) == {"end velocity", "velocity"}
+    assert found.evidence == pytest.approx(1.0, abs=ELASTIC)
+    assert found.unit == "m/s"
+
+
+def test_control_that_moves_nothing():
+    found = only(influence, of.cart(more={"brake": "N"}))
+    assert (found.cause, found.where) == (Cause.NO_INFLUENCE, ("brake",))
+
+
+def test_no_goal_and_unused():
+    assert only(influence, of.cart(constraints=())).cause is Cause.NO_GOAL
+    idle = of.cart(
+        states={"spent": "J"},
+        f=lambda s: (s.velocity, s.force / 2, s.force**2),
+        x0=[0.0, 0.0, 0.0],
+    )
+    found = only(influence, idle)
+    assert (found.cause, found.severity) == (Cause.UNUSED, Severity.ADVICE)
+
+
+def test_uncoupled_state_misses_by_what_its_decay_leaves():
+    """0.5 exp(-0.1 * 2) = 0.409 m where 1 m is asked."""
+    ocp = of.cart(
+        states={"wagon": "m"},
+        f=lambda s: (s.velocity, s.force / 2, -0.1 * s.wagon),
+        x0=[0.0, 0.0, 0.5],
+        constraints=of.ends({"position": 1.0, "wagon": 1.0}),
+    )
+    found = only(unreachable, ocp)
+    assert found.where == ("end wagon", "wagon")
+    assert found.evidence == pytest.approx(1.0 - 0.5 * np.exp(-0.2), rel=MINIMISER)
+
+
+def test_uncoupled_state_that_ends_right_is_no_mistake():
+    ocp = of.cart(
+        states={"clock": "s"},
+        f=lambda s: (s.velocity, s.force / 2, 1.0),
+        x0=[0.0, 0.0, 0.0],
+        constraints=of.ends({"position": 1.0, "clock": 2.0}),
+    )
+    assert not list(unreachable(subject(ocp)))
+
+
+@pytest.mark.parametrize(
+    ("cost", "cause"),
+    [
+        (lambda s: 2 * s.force, Cause.LINEAR_COST),
+        (lambda s: s.position * s.force, Cause.LINEAR_COST),
+        (lambda s: s.position**2, Cause.FREE_CONTROL),
+        (lambda s: -(s.force**2), Cause.WRONG_SIGN),
+        (lambda s: s.force**2 - s.position**2, Cause.WRONG_SIGN),
+    ],
+)
+def test_costs_without_a_minimum(cost, cause):
+    assert only(curvature, of.cart(running_cost=cost, control_bounds=Box())).cause is cause
+
+
+def test_linear_cost_of_a_bounded_control_is_sound():
+    assert not list(curvature(subject(of.room())))
+
+
+def test_stiffness_says_how_many_steps():
+    """A time constant of 1e-4 s over 5 s: 5e4 of them, RK4 takes 2.78 in a step."""
+    ocp = of.tank(
+        states={"valve": ""},
+        f=lambda s: (s.valve - 0.5 * s.level, 1e4 * (s.inflow - s.valve)),
+        x0=[1.0, 0.0],
+        state_bounds=Box(),
+    )
+    found = only(grid, ocp)
+    assert found.where[0] == "valve"
+    assert str(int(np.ceil(5e4 / 2.78))) in found.sentence
+
+
+def test_dependent_ends():
+    ocp = of.cart(
+        constraints=lambda s: (
+            *of.ends({"position": 1.0, "velocity": 0.0})(s),
+            Constraint("twice", 2 * s.position, 2.0, 2.0, at="terminal"),
+        )
+    )
+    assert set(only(duplicate, ocp).where) == {"end position", "twice"}
+
+
+def test_kinks_by_their_order():
+    order = {
+        "abs": (lambda s: ca.fabs(s.force), 0.0),
+        "square of a maximum": (lambda s: ca.fmax(0, s.force) ** 2, 1.0),
+        "jump": (lambda s: ca.if_else(s.force > 0, 1.0, 2.0), -1.0),
+    }
+    for cost, smooth in order.values():
+        found = list(kink(subject(of.cart(running_cost=cost))))
+        assert found[0].evidence == smooth
+        assert found[0].where == ("force",)
+
+
+def test_kinks_that_are_declared_or_smooth_are_none():
+    assert not list(kink(subject(of.cart(running_cost=lambda s: ca.fmax(0, s.force) ** 3))))
+    declared = of.cart(running_cost=lambda s: ca.fabs(s.force), smoothness=0)
+    assert not list(kink(subject(declared)))
+
+
+def test_guess_beyond_the_bounds():
+    found = only(guess, of.cart(guess=Guess(u=[50.0])))
+    assert (found.where, found.evidence) == (("force",), 40.0)
+
+
+def test_scaling_says_what_to_divide_by():
+    ocp = of.cart(
+        states={"altitude": "m"},
+        f=lambda s: (s.velocity, s.force / 2, 1e3 * s.velocity),
+        x0=[0.0, 0.0, 7e6],
+    )
+    found = only(scaling, ocp)
+    assert found.where[0] == "altitude"
+    assert "divide altitude by 1e+07" in found.sentence
+
+
+def test_cost_that_falls_without_limit():
+    ocp = of.cart(
+        running_cost=lambda s: s.force**2 + s.velocity**3, control_bounds=Box(), constraints=()
+    )
+    assert "velocity" in only(unbounded, ocp).where
+    convex = of.cart(running_cost=lambda s: s.force**2 + s.velocity, control_bounds=Box())
+    assert not list(unbounded(subject(convex)))
+
+
+def test_conflict_of_a_line():
+    """x >= 1 and x <= 0 exclude each other, y <= 5 has no part in it."""
+    w = ca.MX.sym("w", 2)
+    elastic = Elastic(
+        w=w,
+        p=ca.MX(0, 1),
+        hard=ca.MX(0, 1),
+        rows=ca.vertcat(w[0], w[1], w[0]),
+        lower=np.array([1.0, -np.inf, -np.inf]),
+        upper=np.array([np.inf, 5.0, 0.0]),
+        owner=np.arange(3),
+        demands=tuple(Demand((n,), n) for n in ("above", "aside", "below")),
+        box=(np.full(2, -np.inf), np.full(2, np.inf)),
+    )
+    answer = elastic.solve(np.zeros(2), np.empty(0), range(3))
+    assert answer.stretch.sum() == pytest.approx(1.0, abs=ELASTIC)
+    assert elastic.conflict(answer, np.empty(0)) == (0, 2)
+    assert elastic.is_possible(elastic.solve(np.zeros(2), np.empty(0), (0, 1)))
+
+
+def test_out_of_reach_in_numbers():
+    """2 kg, 10 N, 0.5 s: a T^2 / 4 = 0.3125 m of 1 m; 32 N, or 2 sqrt(1/5) = 0.894 s, do it."""
+    found = diagnose(of.cart(horizon=0.5)).first
+    assert found is not None
+    assert found.cause is Cause.OUT_OF_REACH
+    assert {"end position", "force"} <= set(found.where)
+    assert found.evidence == pytest.approx(1.0 - 0.3125, abs=ELASTIC)
+    assert found.unit == "m"
+    assert found.instant == pytest.approx(0.5)
+    assert "would have to give way by 22 N" in found.sentence
+    assert "With a horizon of 0.8" in found.sentence
+
+
+def test_time_that_vanishes_and_time_without_end():
+    shrinking = of.fastest(horizon=FreeTime(2.0), constraints=of.ends({"position": 0.0}))
+    assert _first(shrinking) is Cause.VANISHING_TIME
+    assert _first(of.cart(horizon=FreeTime(2.0))) is Cause.ENDLESS_TIME
+
+
+def test_idle_optimum_and_idle_constraint():
+    assert _first(of.servo(running_cost=lambda s: s.spot**2 + s.voltage**2)) is Cause.UNUSED
+    # The start is the goal.
+    assert _first(of.oscillator(x0=[0.0, 0.0])) is Cause.NO_GOAL
+    far = of.cart(
+        constraints=lambda s: (
+            *of.ends({"position": 1.0, "velocity": 0.0})(s),
+            Constraint("wall", s.position, upper=100.0),
+        )
+    )
+    assert _first(far) is Cause.INACTIVE
+
+
+def _first(ocp: OCP) -> Cause | None:
+    found = diagnose(ocp).first
+    return None if found is None else found.cause
+
+
+def test_two_controls_and_a_free_start():
+    """A start on a circle, an end on it: nothing to complain about."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)
+    ocp = OCP(
+        name="circle",
+        model=Model(name="point", x=x, u=u, f=u),
+        x0=[1.0, 0.1],
+        horizon=1.0,
+        running_cost=ca.sumsqr(u),
+        terminal_cost=ca.sumsqr(x - ca.DM([3.0, 0.0])),
+        constraints=(Constraint("circle", ca.sumsqr(x), 1.0, 1.0, at="initial"),),
+    )
+    assert not diagnose(ocp, intervals=20).serious
