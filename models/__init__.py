@@ -4,6 +4,7 @@ from models.arm import PlanarArm
 from models.avoidance import clearance_constraint
 from models.carima import Carima, CarimaPlant
 from models.carima_ocp import carima_ocp
+from models.cart_pole import CartPole, cart_pole_swing_up, cart_pole_upright
 from models.dilemma import BarrierCost, bounded_ocp, unbounded_ocp
 from models.distance_cost import Combine, DistanceCost
 from models.distances import distance_to_segment, signed_distance
@@ -48,6 +49,7 @@ __all__ = [
     "Capsule",
     "Carima",
     "CarimaPlant",
+    "CartPole",
     "Combine",
     "Cost",
     "Difficulty",
@@ -65,6 +67,8 @@ __all__ = [
     "bounded_ocp",
     "bryson_denham",
     "carima_ocp",
+    "cart_pole_swing_up",
+    "cart_pole_upright",
     "clearance_constraint",
     "discrete_double_integrator",
     "distance_to_segment",

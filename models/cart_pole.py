@@ -1,0 +1,206 @@
+"""A pole on a cart: its dynamics, a swing-up of known cost, and the problem that controls it."""
+
+from dataclasses import dataclass, fields
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models._numbers import at_least, vector
+from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, numbers
+
+# Weights of position, angle, velocity and angular velocity, and of the force.
+_STAGE, _END, _FORCE = (1.0, 1.0, 0.1, 0.1), (100.0, 100.0, 10.0, 10.0), 0.01
+
+
+@dataclass(frozen=True)
+class CartPole:
+    r"""A point mass on a massless pole, hinged on a cart that a force drives along a track.
+
+    The cart is at p, the mass at :math:`(p + l \sin θ, -l \cos θ)`: it hangs at θ = 0 and
+    stands at θ = π. With kinetic and potential energy
+
+    .. math::
+
+        T &= \tfrac12 (m_c + m_p) \dot p^2 + m_p l \cos θ \, \dot p \dot θ
+             + \tfrac12 m_p l^2 \dot θ^2, \quad V = -m_p g l \cos θ
+
+    Lagrange's equations are
+
+    .. math::
+
+        (m_c + m_p) \ddot p + m_p l (\cos θ \, \ddot θ - \sin θ \, \dot θ^2) &= u \\
+        \cos θ \, \ddot p + l \ddot θ + g \sin θ &= 0
+
+    and the second, put into the first, gives
+
+    .. math::
+
+        \ddot p = \frac{u + m_p \sin θ (l \dot θ^2 + g \cos θ)}{m_c + m_p \sin^2 θ}, \quad
+        \ddot θ = -\frac{\cos θ \, \ddot p + g \sin θ}{l},
+
+    which is (6.1) and (6.2) of [Kelly 2017]. Nothing is simplified and there is no friction.
+
+    Args:
+        cart: its mass m_c [kg].
+        pole: the point mass m_p [kg].
+        length: of the pole, l [m].
+        gravity: g [m/s^2]; 0 for a table.
+
+    Raises:
+        ProblemError: if a mass or the length is not positive, or gravity negative.
+    """
+
+    cart: float = 1.0
+    pole: float = 0.3
+    length: float = 0.5
+    gravity: float = 9.81
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for entry in fields(self):
+            name = f"cart-pole: {entry.name}"
+            at_least(getattr(self, entry.name), 0.0, name, strictly=entry.name != "gravity")
+
+    def model(self) -> Model:
+        """Return the model; state (p [m], θ [rad], their rates), control: the force [N]."""
+        names = ("position", "angle", "velocity", "angular_velocity")
+        x, u = ca.vertcat(*(ca.SX.sym(name) for name in names)), ca.SX.sym("force")
+        _, angle, velocity, turning = ca.vertsplit(x)
+        sin, cos = ca.sin(angle), ca.cos(angle)
+        pulled = self.pole * sin * (self.length * turning**2 + self.gravity * cos)
+        forward = (u + pulled) / (self.cart + self.pole * sin**2)
+        round_hinge = -(cos * forward + self.gravity * sin) / self.length
+        return Model(
+            name="cart-pole",
+            x=x,
+            u=u,
+            f=ca.vertcat(velocity, turning, forward, round_hinge),
+            x_units=("m", "rad", "m/s", "rad/s"),
+            u_units=("N",),
+        )
+
+    def energy(self, x: ca.SX) -> ca.SX:
+        """Return T + V [J] in a state (4,), 0 at the height of the cart; kept without force."""
+        _, angle, velocity, turning = ca.vertsplit(x)
+        moving = (self.cart + self.pole) * velocity**2 + self.pole * (
+            2.0 * self.length * ca.cos(angle) * velocity * turning + (self.length * turning) ** 2
+        )
+        return moving / 2.0 - self.pole * self.gravity * self.length * ca.cos(angle)
+
+
+def cart_pole_swing_up(
+    system: CartPole | None = None,
+    *,
+    distance: float = 1.0,
+    horizon: float = 2.0,
+    force: float = 20.0,
+    track: float = 2.0,
+) -> OCP:
+    r"""Swing the pole up with least force squared, the cart from rest at 0 to rest at d.
+
+    .. math::
+
+        \min \int_0^T u^2 \, dt, \quad |u| \le u_{max}, \; |p| \le p_{max}, \quad
+        (p, θ, \dot p, \dot θ): (0, 0, 0, 0) \to (d, π, 0, 0)
+
+    The defaults are the problem of [Kelly 2017], section 6 and appendix E.1.
+
+    Args:
+        system: masses and length; default: those of Kelly.
+        distance: d [m].
+        horizon: T [s].
+        force: largest force [N]; inf: none.
+        track: how far the cart may go to either side [m]; inf: any way.
+
+    Raises:
+        ProblemError: if a bound is negative, or the end lies beyond the track.
+    """
+    model = (system or CartPole()).model()
+    end = [float(distance), np.pi, 0.0, 0.0]
+    return OCP(
+        name="cart-pole swing-up",
+        model=model,
+        x0=np.zeros(4),
+        horizon=horizon,
+        running_cost=model.u**2,
+        control_bounds=_within(force, "force"),
+        state_bounds=_on(track, distance),
+        constraints=(Constraint("end", model.x, end, end, at="terminal"),),
+        guess=Guess(x=[np.zeros(4), end], u=[0.0]),
+    )
+
+
+def cart_pole_upright(
+    system: CartPole | None = None,
+    *,
+    distance: float = 0.0,
+    horizon: float = 1.0,
+    force: float = 20.0,
+    track: float = 2.0,
+    stage: ArrayLike = _STAGE,
+    end: ArrayLike = _END,
+    effort: float = _FORCE,
+) -> OCP:
+    r"""Bring the pole up and keep it there: the problem of one horizon of a controller.
+
+    .. math::
+
+        \min \tfrac12 \tilde x(T)' S \tilde x(T) + \tfrac12 \int_0^T \tilde x' Q \tilde x + r u^2
+        \, dt, \quad \tilde x = x - (d, π, 0, 0), \quad |u| \le u_{max}, \; |p| \le p_{max}
+
+    With Q, S diagonal; no end is prescribed, so that any horizon is feasible from any state that can
+    be kept on the track.
+
+    Args:
+        system: masses and length; default: those of ``CartPole``.
+        distance: d, where the cart shall stand [m].
+        horizon: T [s].
+        force: largest force [N]; inf: none.
+        track: how far the cart may go to either side [m]; inf: any way.
+        stage: diagonal of Q (4,).
+        end: diagonal of S (4,).
+        effort: r.
+
+    Raises:
+        ProblemError: if a bound or weight is negative, or the target lies beyond the track.
+    """
+    model = (system or CartPole()).model()
+    off = model.x - ca.DM([distance, np.pi, 0.0, 0.0])
+    q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
+    r = at_least(effort, 0.0, "cart-pole: effort", strictly=True)
+    return OCP(
+        name="cart-pole upright",
+        model=model,
+        x0=np.zeros(4),
+        horizon=horizon,
+        running_cost=(ca.dot(q, off**2) + r * model.u**2) / 2.0,
+        terminal_cost=ca.dot(s, off**2) / 2.0,
+        control_bounds=_within(force, "force"),
+        state_bounds=_on(track, distance),
+    )
+
+
+def _within(force: float, what: str) -> Box:
+    """Return |u| <= force; inf is allowed."""
+    largest = float(numbers(force, 1, f"cart-pole: {what}", finite=False)[0])
+    if largest < 0.0:
+        raise ProblemError(f"cart-pole: {what} = {largest}, it must not be negative")
+    return Box(-largest, largest)
+
+
+def _on(track: float, distance: float) -> Box:
+    """Return |p| <= track, for a cart that has to get to ``distance``."""
+    end = abs(float(vector(distance, 1, "cart-pole: distance")[0]))
+    side = float(np.asarray(_within(track, "track").upper))
+    if end > side:
+        raise ProblemError(f"cart-pole: distance = {distance} m is beyond the track of {side} m")
+    free = np.full(3, np.inf)
+    return Box([-side, *-free], [side, *free])
+
+
+def _weights(values: ArrayLike, what: str) -> ca.DM:
+    weights = vector(values, 4, f"cart-pole: {what}")
+    if (weights < 0.0).any():
+        raise ProblemError(f"cart-pole: {what} = {weights}, no weight may be negative")
+    return ca.DM(weights)
