@@ -6,6 +6,7 @@ from benchmarks.commands.command import Command
 from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, MPC
+from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.run import RUN
 from benchmarks.commands.speed import ARM_SPEED, SPEED
 
@@ -20,6 +21,7 @@ COMMANDS: tuple[Command, ...] = (
     CLEAR,
     MPC,
     FAULTS,
+    PEERS_COMMAND,
 )
 
 __all__ = ["COMMANDS", "Command"]
