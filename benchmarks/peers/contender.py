@@ -60,7 +60,7 @@ class Contender(ABC):
             PeerFailed: with the reason.
         """
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - most hold nothing
         """Give back what it holds."""
 
 
@@ -153,10 +153,14 @@ def _expecting(answer: Mapping[str, Any]) -> Iterator[None]:
 
 
 def _plan(job: Job, situation: Situation, name: str, answer: Mapping[str, Any]) -> Solution:
-    """What a peer answered as a Solution; controls at as many instants as states: linear."""
+    """What a peer answered as a Solution.
+
+    With costates its control is the minimiser of the Hamiltonian along them; else it is held.
+    """
     x, u = np.array(answer["x"], dtype=float), np.array(answer["u"], dtype=float)
     grid = np.array(job.along(situation))[:, 0]
     t = np.array(answer.get("t", grid), dtype=float)
+    has_costates = "costate" in answer
     # A solution has no NaN; the referee then finds that such controls are worth nothing.
     if not (np.isfinite(x).all() and np.isfinite(u).all()):
         raise PeerFailed(f"its answer is not finite; it says: {answer['status']}")
@@ -167,9 +171,9 @@ def _plan(job: Job, situation: Situation, name: str, answer: Mapping[str, Any]) 
         t=t,
         x=x,
         x0=situation.x0,
-        costate=np.zeros_like(x),
+        costate=np.array(answer["costate"], dtype=float) if has_costates else 0.0 * x,
         u=u,
-        control_kind="linear" if len(u) == len(x) else "held",
+        control_kind="extremal" if has_costates else "held",
         cost=0.0,
         parameters={k: np.asarray(v) for k, v in situation.parameters.items()},
     )

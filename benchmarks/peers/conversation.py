@@ -22,7 +22,7 @@ _ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND
 
 
 class PeerFailed(Exception):
-    """A peer did not start, ended, hung or spoke nonsense; the text says which, with its last words."""
+    """A peer did not start, ended, hung or spoke nonsense; the text quotes its last words."""
 
 
 class Conversation:

@@ -66,7 +66,7 @@ def _symbols(job: Job) -> list[ca.SX]:
 def _stage(job: Job) -> ca.Function:
     x, u, p = _symbols(job)
     step = Stage.of(job.ocp, RK4(), held=True).step
-    return ca.Function("stage", [x, u, p], step(x, u, p[0], job.interval, p[1:], p[1:]))
+    return ca.Function("stage", [x, u, p], [*step(x, u, p[0], job.interval, p[1:], p[1:])])
 
 
 def _rate(job: Job) -> ca.Function:

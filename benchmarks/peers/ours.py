@@ -1,5 +1,7 @@
 """Our own solvers beside the peers; the first one of a job is what gaps are taken against."""
 
+from typing import Literal
+
 from benchmarks.peers.contender import OwnContender
 from benchmarks.peers.job import Job
 from solvers import LinearMPC, MultipleShooting
@@ -23,7 +25,7 @@ def own_contenders(job: Job) -> list[OwnContender]:
     ]
 
 
-_LINEAR = (
+_LINEAR: tuple[tuple[str, Literal["sparse", "condensed"]], ...] = (
     ("osqp", "sparse"),
     ("piqp", "sparse"),
     ("daqp", "condensed"),

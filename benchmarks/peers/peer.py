@@ -13,7 +13,7 @@ class Peer:
     Args:
         name: what a user types; also the name of its environment.
         about: the package and the method in one line.
-        script: file of ``scripts/``; empty: no adapter was written, and ``about`` says so.
+        script: file of ``scripts/``; empty: it is known, and no adapter was written.
         requirements: file of ``requirements/`` with exact versions; empty: it runs in our own
             environment, since all that it needs is there.
         settings: ways to run it, a row in the table each.
@@ -26,6 +26,11 @@ class Peer:
     requirements: str = ""
     settings: tuple[str, ...] = ("",)
     folder: Path = _HERE / "scripts"
+
+    @property
+    def has_adapter(self) -> bool:
+        """Whether it can be run."""
+        return bool(self.script)
 
     @property
     def wanted(self) -> str:
@@ -60,7 +65,7 @@ PEERS: tuple[Peer, ...] = (
         "SQP with HPIPM, generated C; full steps to convergence, or real-time iteration",
         "acados_sqp.py",
         "acados.txt",
-        ("SQP", "RTI"),
+        ("SQP", "SQP, Gauss-Newton", "RTI"),
     ),
     Peer("rockit", "direct multiple shooting, IPOPT", "rockit_direct.py", "rockit.txt"),
     Peer(
@@ -69,12 +74,7 @@ PEERS: tuple[Peer, ...] = (
         "crocoddyl_ddp.py",
         "crocoddyl.txt",
     ),
-    Peer(
-        "control",
-        "python-control's optimal module, on scipy's SLSQP",
-        "control_slsqp.py",
-        "control.txt",
-    ),
-    Peer("ssqp", "SQP along the stages, ADMM within", "ssqp_sqp.py", "ssqp.txt"),
-    Peer("nmpyc", "nonlinear MPC on CasADi and IPOPT", "nmpyc_direct.py", "nmpyc.txt"),
+    Peer("control", "python-control's optimal module, on scipy's SLSQP", "", "control.txt"),
+    Peer("ssqp", "SQP along the stages, ADMM within", "", "ssqp.txt"),
+    Peer("nmpyc", "nonlinear MPC on CasADi and IPOPT", "", "nmpyc.txt"),
 )

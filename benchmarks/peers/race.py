@@ -16,7 +16,7 @@ from ocp import evaluate
 COLD_SOLVES = 5
 # Whoever has taken this long for one job [s of processor time] is asked no more: what it has
 # answered counts.
-PATIENCE = 60.0
+PATIENCE = 15.0
 _REASONS = {
     CannotTreat: "cannot treat it",
     NotInstalled: "not installed",
@@ -149,10 +149,8 @@ def _measured(
 
 def _costs(runner: _Runner) -> tuple[dict[int, float], list[float]]:
     """The referee's costs by turn, and violations; repeated cold solves are the same solve."""
-    answers = runner.judged if runner.warm else dict(list(runner.cold.items())[-1:])
+    answers = runner.warm or {0: list(runner.cold.values())[-1]}
     verdicts = {turn: evaluate(answer.plan) for turn, answer in answers.items()}
-    if not runner.warm:  # whatever the turn: one situation
-        verdicts = {0: verdict for verdict in verdicts.values()}
     costs = {turn: verdict.cost for turn, verdict in verdicts.items()}
     return costs, [verdict.violation for verdict in verdicts.values()]
 

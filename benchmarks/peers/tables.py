@@ -83,9 +83,12 @@ def _cells(entry: Entry) -> list[str]:
         return [name, _version(entry), *[""] * 7, f"{entry.outcome}: {entry.remark}"]
     times = (_number(entry.cold, 1e3, ".3g"), _number(entry.warm, 1e3, ".3g"))
     ratios = (_number(entry.cold_ratio, 1.0, ".2g"), _number(entry.warm_ratio, 1.0, ".2g"))
+    # The cost of what violates a constraint says nothing, nor does the time it took.
+    worth = entry.good == entry.solves
+    ratios = ratios if worth else ("", "")
     numbers = (
-        _number(entry.cost, 1.0, ".7g"),
-        _number(entry.gap, 1.0, "+.1e"),
+        _number(entry.cost if worth else None, 1.0, ".7g"),
+        _number(entry.gap if worth else None, 1.0, "+.1e"),
         _number(entry.violation, 1.0, ".0e"),
     )
     return [name, _version(entry), *numbers, *times, *ratios, _remarks(entry)]

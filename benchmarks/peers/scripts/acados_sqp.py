@@ -27,24 +27,25 @@ class Acados:
     """The same stage map as discrete dynamics, its cost as external cost."""
 
     def __init__(self, job: dict) -> None:
+        """State the problem."""
         self.versions = {
             "comma-deps-acados": version("comma-deps-acados"),
             "casadi": casadi.__version__,
             "numpy": np.__version__,
         }
-        self._is_rti = job["setting"] == "RTI"
-        self.remark = "one iteration a step, also the cold one" if self._is_rti else ""
+        self.remark = "one iteration a step, also the cold one" if job["setting"] == "RTI" else ""
         self._job = job
-        self._solver = AcadosOcpSolver(_stated(job, self._is_rti), json_file="job.json")
+        self._solver = AcadosOcpSolver(_stated(job), json_file="job.json")
 
-    def step(self, x0, p, guess):
+    def step(self, x0: np.ndarray, p: np.ndarray, guess: dict | None) -> None:
+        """Solve from the guess, or from the last answer."""
         solver, n = self._solver, self._job["N"]
         if guess is not None:
             for k in range(n):
                 solver.set(k, "u", guess["u"][k])
+                solver.set(k, "pi", 0.0 * x0)
             for k in range(n + 1):
                 solver.set(k, "x", guess["x"][k])
-                solver.set(k, "pi" if k < n else "x", 0 * x0 if k < n else guess["x"][k])
         for k in range(n + 1):
             solver.set(k, "p", p[k])
         solver.set(0, "lbx", x0)
@@ -52,7 +53,8 @@ class Acados:
         self._status = solver.solve()
         solver.get(0, "u")
 
-    def plan(self):
+    def plan(self) -> dict:
+        """Return the last answer."""
         solver, n = self._solver, self._job["N"]
         iterations = int(np.sum(solver.get_stats("sqp_iter")))
         word = f"{'solved' if self._status == 0 else f'failed: status {self._status}'}"
@@ -63,7 +65,7 @@ class Acados:
         }
 
 
-def _stated(job: dict, is_rti: bool) -> AcadosOcp:
+def _stated(job: dict) -> AcadosOcp:
     ocp, model = AcadosOcp(acados.DIR), AcadosModel()
     x, u, p = (casadi.SX.sym(name, job[f"n{name}"]) for name in ("x", "u", "p"))
     after, cost = with_casadi(job["stage"], [x, u, p], casadi)
@@ -79,8 +81,10 @@ def _stated(job: dict, is_rti: bool) -> AcadosOcp:
     options = ocp.solver_options
     options.tf = job["N"] * job["interval"]
     options.integrator_type = "DISCRETE"
-    options.nlp_solver_type = "SQP_RTI" if is_rti else "SQP"
-    options.hessian_approx = "EXACT"
+    options.nlp_solver_type = "SQP_RTI" if job["setting"] == "RTI" else "SQP"
+    # With an external cost, Gauss-Newton leaves out the curvature of the dynamics only.
+    no_curvature = job["setting"].endswith("Gauss-Newton")
+    options.hessian_approx = "GAUSS_NEWTON" if no_curvature else "EXACT"
     options.regularize_method = "PROJECT"
     options.qp_solver = "PARTIAL_CONDENSING_HPIPM"
     options.nlp_solver_max_iter = _ITERATIONS

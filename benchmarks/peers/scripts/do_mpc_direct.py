@@ -13,11 +13,12 @@ class RecedingHorizon:
     """Its MPC class: parameters along the horizon are its ``_tvp``."""
 
     def __init__(self, job: dict) -> None:
+        """State the problem."""
         self.versions = {name: version(name) for name in ("do-mpc", "casadi", "numpy")}
         held = job["setting"] == "same grid"
         if not held and job["rate"] is None:
             raise CannotTreat("collocation is for continuous time")
-        self.remark = "" if held else "Radau collocation of order 2 within each interval"
+        self.remark = "" if held else "Radau collocation of order 2, the cost summed over the nodes"
         self._job, self._p = job, np.zeros((job["N"] + 1, job["np"]))
         model = do_mpc.model.Model("discrete" if held else "continuous", "SX")
         x = model.set_variable("_x", "x", (job["nx"], 1))
@@ -42,7 +43,9 @@ class RecedingHorizon:
             mpc.settings.collocation_deg = 2
             mpc.settings.collocation_ni = 1
         end = with_casadi(job["terminal"], [x, p], casadi)[0]
-        mpc.set_objective(mterm=end, lterm=with_casadi(law, [x, u, p], casadi)[1])
+        cost = with_casadi(law, [x, u, p], casadi)[1]
+        # It sums the running cost over the nodes, whatever the model is.
+        mpc.set_objective(mterm=end, lterm=cost if held else job["interval"] * cost)
         mpc.set_rterm(u=0.0)
         for kind, name in (("_x", "x"), ("_u", "u")):
             for side in ("lower", "upper"):
@@ -61,7 +64,8 @@ class RecedingHorizon:
         mpc.set_tvp_fun(ahead)
         mpc.setup()
 
-    def step(self, x0, p, guess):
+    def step(self, x0: np.ndarray, p: np.ndarray, guess: dict | None) -> None:
+        """Solve from the guess, or from the last answer."""
         mpc = self._mpc
         self._p = p
         if guess is not None:
@@ -75,7 +79,8 @@ class RecedingHorizon:
                 found["_u", k, 0] = guess["u"][k]
         mpc.make_step(x0)
 
-    def plan(self):
+    def plan(self) -> dict:
+        """Return the last answer."""
         n, found = self._job["N"], self._mpc.opt_x_num
         stats = self._mpc.solver_stats
         word = stats["return_status"]

@@ -28,11 +28,14 @@ def _accuracy(tolerance: float) -> dict[str, dict]:
 
 
 class CondensedTracking:
-    """It constrains nodes 0 to N - 1; the measured state is left free here, as everywhere, and
-    node N is constrained through the state before it.
+    """What it states itself constrains nodes 0 to N - 1.
+
+    The measured state is left free here, as everywhere, and node N is constrained through the
+    state before it.
     """
 
     def __init__(self, job: dict) -> None:
+        """State the problem."""
         if job["linear"] is None:
             raise CannotTreat("linear dynamics and quadratic costs only")
         self._backend = job["setting"]
@@ -58,7 +61,8 @@ class CondensedTracking:
         )
         self._program = qpmpc.MPCQP(self._problem, sparse=self._backend in _SPARSE)
 
-    def step(self, x0, p, guess):
+    def step(self, x0: np.ndarray, p: np.ndarray, guess: dict | None) -> None:
+        """Solve from the guess, or from the last answer."""
         reference = p[:, 1:]
         self._problem.update_initial_state(x0)
         self._problem.update_target_states(reference[:-1].ravel())
@@ -72,7 +76,8 @@ class CondensedTracking:
             )
         self._x0 = x0
 
-    def plan(self):
+    def plan(self) -> dict:
+        """Return the last answer."""
         found = self._found.x is not None
         m = self._B.shape[1]
         u = self._found.x.reshape(-1, m) if found else np.zeros((self._N, m))

@@ -8,12 +8,24 @@ from typing import Any
 
 import numpy as np
 
+_IN_NUMPY: dict[str, Callable] = {
+    "if_else_zero": lambda condition, value: np.where(condition, value, 0.0),
+    "not": np.logical_not,
+    "and": np.logical_and,
+    "or": np.logical_or,
+}
 
-def _numpy_if(condition: Any, value: Any) -> Any:
-    return np.where(condition, value, 0.0)
+
+def _in_casadi(casadi: Any) -> dict[str, Callable]:
+    return {
+        "if_else_zero": lambda condition, value: casadi.if_else(condition, value, 0.0),
+        "not": casadi.logic_not,
+        "and": casadi.logic_and,
+        "or": casadi.logic_or,
+    }
 
 
-def _operations(library: Any, if_else_zero: Callable[[Any, Any], Any]) -> dict[str, Callable]:
+def _operations(library: Any, own: dict[str, Callable]) -> dict[str, Callable]:
     plain: dict[str, Callable] = {
         "add": lambda a, b: a + b,
         "sub": lambda a, b: a - b,
@@ -28,21 +40,20 @@ def _operations(library: Any, if_else_zero: Callable[[Any, Any], Any]) -> dict[s
         "lt": lambda a, b: a < b,
         "le": lambda a, b: a <= b,
         "assign": lambda a: a,
-        "if_else_zero": if_else_zero,
     }
     same = ("sin", "cos", "tan", "sqrt", "exp", "log", "fmin", "fmax", "fabs", "tanh", "sign")
-    return plain | {name: getattr(library, name) for name in same}
+    return plain | own | {name: getattr(library, name) for name in same}
 
 
 def with_casadi(tape: dict, inputs: Sequence[Any], casadi: Any) -> list[Any]:
     """Return the outputs as columns of expressions; ``inputs`` are SX or MX columns."""
-    operations = _operations(casadi, lambda c, y: casadi.if_else(c, y, 0.0))
+    operations = _operations(casadi, _in_casadi(casadi))
     return [casadi.vertcat(*rows) for rows in _replay(tape, inputs, operations)]
 
 
 def with_numpy(tape: dict, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return the outputs (size, ...); ``inputs`` are (size, ...), all entries alike in shape."""
-    operations = _operations(np, _numpy_if)
+    operations = _operations(np, _IN_NUMPY)
     return [
         np.array(np.broadcast_arrays(*rows)) if rows else np.zeros(0)
         for rows in _replay(tape, inputs, operations)
@@ -62,3 +73,9 @@ def _replay(tape: dict, inputs: Sequence[Any], operations: dict[str, Callable]) 
         else:
             registers[target] = operations[name](*[registers[a] for a in arguments])
     return outputs
+
+
+def function(tape: dict, casadi: Any) -> Any:
+    """Return it as a Function of scalars, which can be called with MX or numbers."""
+    inputs = [casadi.SX.sym(f"i{k}", size) for k, size in enumerate(tape["inputs"])]
+    return casadi.Function("replayed", inputs, with_casadi(tape, inputs, casadi))

@@ -1,13 +1,13 @@
 """scipy's solve_bvp on the equations of the minimum principle, derived by us."""
 
+from typing import Any
+
 import numpy as np
 import scipy
 from replay import with_numpy
 from scipy.integrate import solve_bvp
 from wire import CannotTreat, end_state, serve
 
-# Its polynomials are handed over at so many instants: in between the control counts as linear.
-_SAMPLES = 2001
 _MOST_NODES = 10_000
 
 
@@ -15,15 +15,17 @@ class BoundaryValueProblem:
     """State and costate over the horizon; the control is the minimiser of the Hamiltonian."""
 
     def __init__(self, job: dict) -> None:
+        """Refuse a problem whose Hamiltonian does not determine the control."""
         if job["extremal"] is None:
             raise CannotTreat(f"it needs the minimum principle: {job['why_no_extremal']}")
         self.versions = {"scipy": scipy.__version__, "numpy": np.__version__}
-        self.remark = "own mesh; control not held; bounds of states are not imposed"
+        self.remark = "own mesh, control not held; does not impose bounds of states"
         self._job, self._end = job, end_state(job)
         self._nx = job["nx"]
-        self._last = None
+        self._last: Any = None
 
-    def step(self, x0, p, guess):
+    def step(self, x0: np.ndarray, p: np.ndarray, guess: dict | None) -> None:
+        """Solve on the mesh of the job, from the guess with costates 0, or from the last answer."""
         times = p[:, 0]
         tolerance = max(self._job["tolerance"], 100 * np.finfo(float).eps)
         if guess is None and self._last is not None:
@@ -46,15 +48,15 @@ class BoundaryValueProblem:
         free = costate - slope
         return np.array([x[i] - self._end[i] if i in self._end else free[i] for i in range(len(x))])
 
-    def plan(self):
-        ends = self._last.x[[0, -1]]
-        t = np.linspace(*ends, _SAMPLES)
-        y = self._last.sol(t)
+    def plan(self) -> dict:
+        """Return the last answer on its own mesh."""
+        y, t = self._last.y, self._last.x
         u = with_numpy(self._job["extremal"]["flow"], [y, t[None]])[1]
         good = self._last.status == 0
         return {
             "t": t,
             "x": y[: self._nx].T,
+            "costate": y[self._nx :].T,
             "u": u.reshape(-1, len(t)).T,
             "status": "solved" if good else f"failed: {self._last.message}",
         }
