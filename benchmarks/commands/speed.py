@@ -34,6 +34,6 @@ def _arm(options: Namespace, console: Console) -> int:
 
 
 SPEED = Command(
-    "speed", "linear control: a step over N, and beside qpmpc", _linear_options, _linear
+    "speed", "linear control: a step over N", _linear_options, _linear
 )
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
