@@ -1,4 +1,4 @@
-"""What a warm-started step of MPC costs on the arm: interpreted, compiled, and the driver itself.
+"""What a warm-started step of MPC costs on the arm: interpreted and compiled.
 
 Times are processor times of this process; all contenders decide for the same measured states in
 turns, so that ratios of one run mean something where the times do not.
@@ -6,15 +6,12 @@ turns, so that ratios of one run mean something where the times do not.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import process_time
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from models import random_scenarios
-from ocp import MPC, OCP, Applied, FlightRecorder, Outcome, Program, Solution, Solver, Start, solve
+from ocp import MPC, OCP, Applied, Outcome, Solver, solve
 from solvers import IndirectShooting, MultipleShooting, Schuetz
 
 INTERVALS = (10, 20, 35, 50, 100, 200)
@@ -53,14 +50,6 @@ class Steps:
     def over(self, other: "Steps") -> float:
         """Return the median ratio of the steps of this and of another contender."""
         return float(np.median(np.array(self.times) / np.array(other.times)))
-
-
-@dataclass(frozen=True)
-class Overhead:
-    """Time of the driver around its solver, a step [s]: median and 5 % quantile."""
-
-    driver: tuple[float, float]
-    recorder: tuple[float, float]
 
 
 def arm(links: int = 3) -> OCP:
@@ -108,58 +97,6 @@ def arm_steps(solvers: Mapping[str, Solver], ocp: OCP, count: int) -> list[Steps
         Steps(name, compiled, tuple(times[name, compiled][_WARM:]), planned[name, compiled] / count)
         for name, compiled in racing
     ]
-
-
-@dataclass(frozen=True)
-class _Known(Solver):
-    """A solver that knows the answer and counts its own time."""
-
-    answer: Solution
-    spent: list[float]
-
-    def build(self, ocp: OCP) -> "_KnownProgram":
-        return _KnownProgram(self)
-
-
-@dataclass(frozen=True, eq=False)
-class _KnownProgram(Program):
-    solver: _Known
-
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
-    ) -> Solution:
-        started = perf_counter()
-        answer = self.solver.answer
-        found = answer.with_(t=answer.t - answer.t[0] + t0)
-        self.solver.spent.append(perf_counter() - started)
-        return found
-
-
-def driver_overhead(count: int = 500) -> Overhead:
-    """Measure ``MPC.step`` less the solver's own ``run``, and what the recorder takes on top."""
-    ocp, spent = arm(), []
-    answer = solve(ocp, MultipleShooting(N)).or_raise()
-    mpc = MPC(ocp=ocp, solver=_Known(answer, spent), dt=DT, applied=Applied("rate"))
-    whole, recording, x = [], [], ocp.start()
-    with TemporaryDirectory() as folder, FlightRecorder(mpc, Path(folder) / "flight") as recorder:
-        for k in range(count):
-            started = perf_counter()
-            decision = mpc.step(x, k * DT)
-            between = perf_counter()
-            recorder.watch(x, decision)
-            recording.append(perf_counter() - between)
-            whole.append(between - started)
-    around = np.array(whole)[_WARM:] - np.array(spent)[_WARM:]
-    recorded = np.array(recording)[_WARM:]
-    driver, recorder_time = (
-        (float(np.median(t)), float(np.quantile(t, 0.05))) for t in (around, recorded)
-    )
-    return Overhead(driver, recorder_time)
 
 
 def exponent(sizes: tuple[int, ...], times: tuple[float, ...]) -> float:

@@ -9,14 +9,13 @@ from benchmarks.arm_speed import (
     INTERVALS,
     LINKS,
     N,
-    Overhead,
     Steps,
     arm,
     arm_steps,
     contenders,
-    driver_overhead,
     exponent,
 )
+from benchmarks.driver_overhead import driver_overhead, overhead_line
 
 
 def print_arm_speed(
@@ -64,13 +63,3 @@ def growth_table(grown: dict[int, list[Steps]], title: str) -> Table:
         stages = "compiled" if line[0].compiled else "interpreted"
         table.add_row(line[0].name, stages, *(f"{1e3 * m:.2f}" for m in medians), slope)
     return table
-
-
-def overhead_line(found: Overhead) -> str:
-    """Return the driver's own time in words."""
-    (driver, least), (recorder, least_recorder) = found.driver, found.recorder
-    return (
-        f"the driver around its solver takes {1e6 * driver:.0f} us a step (5 % quantile "
-        f"{1e6 * least:.0f} us), the flight recorder {1e6 * recorder:.0f} us (5 % quantile "
-        f"{1e6 * least_recorder:.0f} us) on top"
-    )

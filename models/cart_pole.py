@@ -11,6 +11,8 @@ from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, numbers
 
 # Weights of position, angle, velocity and angular velocity, and of the force.
 _STAGE, _END, _FORCE = (1.0, 1.0, 0.1, 0.1), (100.0, 100.0, 10.0, 10.0), 0.01
+# Of the cushion at the ends of the track [1/m^2].
+_PRICE = 1e5
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,11 @@ def cart_pole_swing_up(
 
     The defaults are the problem of [Kelly 2017], section 6 and appendix E.1.
 
+    Reference optimum: 58.807667458, by ``polish`` to 1e-10, without the track: no bound is
+    active, |u| <= 14.0 N and p <= 1.18 m. Multiple shooting holds its forces and costs
+    59.132, 58.888, 58.828 and 58.813 on 50, 100, 200 and 400 intervals, which extrapolates
+    to 58.807667.
+
     Args:
         system: masses and length; default: those of Kelly.
         distance: d [m].
@@ -127,7 +134,7 @@ def cart_pole_swing_up(
         control_bounds=_within(force, "force"),
         state_bounds=_on(track, distance),
         constraints=(Constraint("end", model.x, end, end, at="terminal"),),
-        guess=Guess(x=[np.zeros(4), end], u=[0.0]),
+        guess=Guess(x=np.array([np.zeros(4), end]), u=[0.0]),
     )
 
 
@@ -138,6 +145,7 @@ def cart_pole_upright(
     horizon: float = 1.0,
     force: float = 20.0,
     track: float = 2.0,
+    cushion: float = 0.0,
     stage: ArrayLike = _STAGE,
     end: ArrayLike = _END,
     effort: float = _FORCE,
@@ -147,10 +155,15 @@ def cart_pole_upright(
     .. math::
 
         \min \tfrac12 \tilde x(T)' S \tilde x(T) + \tfrac12 \int_0^T \tilde x' Q \tilde x + r u^2
-        \, dt, \quad \tilde x = x - (d, π, 0, 0), \quad |u| \le u_{max}, \; |p| \le p_{max}
+        + w \max(0, |p| - p_{max} + c)^2 \, dt, \quad |u| \le u_{max}, \; |p| \le p_{max}
 
-    With Q, S diagonal; no end is prescribed, so that any horizon is feasible from any state that can
-    be kept on the track.
+    with x̃ = x - (d, π, 0, 0), Q and S diagonal, and w = 5e4. No end is prescribed.
+
+    Where the track is a hard bound, an optimal cart runs along it, and the smallest error of
+    the model then leaves it no way back: no force stops it at once. With a cushion the price
+    w alone keeps the cart away, which also serves solvers that take no state bounds:
+    |p| <= p_max is then no bound of the problem any more. The second derivative jumps, so
+    that the smoothness is 1.
 
     Args:
         system: masses and length; default: those of ``CartPole``.
@@ -158,26 +171,36 @@ def cart_pole_upright(
         horizon: T [s].
         force: largest force [N]; inf: none.
         track: how far the cart may go to either side [m]; inf: any way.
+        cushion: c [m]; 0: none.
         stage: diagonal of Q (4,).
         end: diagonal of S (4,).
         effort: r.
 
     Raises:
-        ProblemError: if a bound or weight is negative, or the target lies beyond the track.
+        ProblemError: if a bound or weight is negative, or the target lies beyond the track or
+            in its cushion.
     """
     model = (system or CartPole()).model()
     off = model.x - ca.DM([distance, np.pi, 0.0, 0.0])
     q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
     r = at_least(effort, 0.0, "cart-pole: effort", strictly=True)
+    soft, on_track = at_least(cushion, 0.0, "cart-pole: cushion"), _on(track, distance)
+    if soft and not abs(distance) <= track - soft < np.inf:
+        raise ProblemError(
+            f"cart-pole: with a cushion of {soft} m the track of {track} m must be finite, and "
+            f"leave distance = {distance} m free"
+        )
+    beyond = ca.fmax(0.0, ca.fabs(model.x[0]) - (track - soft)) if soft else ca.SX(0.0)
     return OCP(
         name="cart-pole upright",
         model=model,
         x0=np.zeros(4),
         horizon=horizon,
-        running_cost=(ca.dot(q, off**2) + r * model.u**2) / 2.0,
+        running_cost=(ca.dot(q, off**2) + r * model.u**2 + _PRICE * beyond**2) / 2.0,
         terminal_cost=ca.dot(s, off**2) / 2.0,
         control_bounds=_within(force, "force"),
-        state_bounds=_on(track, distance),
+        state_bounds=Box() if soft else on_track,
+        smoothness=1 if soft else 2,
     )
 
 

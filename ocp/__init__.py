@@ -18,12 +18,13 @@ from ocp.linear.structure import linear_quadratic
 from ocp.linear.terminal_set import Polyhedron, terminal_set, with_terminal_set
 from ocp.model import Model
 from ocp.mpc.applied import Applied
-from ocp.mpc.decision import Controller, ControlRefused, Decision, Outcome
+from ocp.mpc.decision import Attempt, Controller, ControlRefused, Decision, Outcome
 from ocp.mpc.driver import MPC
 from ocp.mpc.law import Law
 from ocp.mpc.loop import closed_loop
 from ocp.mpc.plant import Plant
-from ocp.mpc.recorder import FlightRecorder, Record, Replay, records, replay, replay_all
+from ocp.mpc.record import Record, records
+from ocp.mpc.recorder import FlightRecorder, Replay, replay, replay_all
 from ocp.mpc.rollout import Rollout
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
@@ -39,6 +40,7 @@ __all__ = [
     "OCP",
     "RK4",
     "Applied",
+    "Attempt",
     "Box",
     "Buffered",
     "Compiler",

@@ -28,7 +28,7 @@ class Buffered:
         for place, given in zip(buffers.inputs, inputs, strict=True):
             place.put(np.asarray(given, dtype=float))
         buffers.evaluate()
-        return tuple(place.get() for place in buffers.outputs)
+        return tuple([place.get() for place in buffers.outputs])
 
     @cached_property
     def _buffers(self) -> "_Buffers":

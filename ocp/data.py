@@ -1,11 +1,14 @@
 """The numbers of one run."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
 from ocp.parameters import ParameterValues
+from ocp.problem import OCP
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,3 +29,18 @@ class Data:
         """Refuse an initial time that is not finite."""
         if not np.isfinite(self.t0):
             raise ProblemError(f"t0 = {self.t0}, a finite time is needed")
+
+    @classmethod
+    def of(
+        cls,
+        ocp: OCP,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> "Data":
+        """Return the numbers of a run as ``Program.run`` takes them, checked.
+
+        Raises:
+            ProblemError: if start, time or parameters do not fit the problem.
+        """
+        return cls(ocp.start(x0), t0, ocp.parameter_values(parameters))

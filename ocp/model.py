@@ -1,6 +1,7 @@
 """The dynamics of a problem: symbols, right-hand side, names and units."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 
@@ -65,12 +66,12 @@ class Model:
                     f"for {size} symbols"
                 )
 
-    @property
+    @cached_property
     def nx(self) -> int:
         """Number of states."""
         return self.x.numel()
 
-    @property
+    @cached_property
     def nu(self) -> int:
         """Number of controls."""
         return self.u.numel()

@@ -137,9 +137,9 @@ class ParameterValues:
 
     def at(self, fraction: ArrayLike, side: Literal[-1, 1] = 1) -> np.ndarray:
         """Return the stacked parameter vector at fractions of the horizon, (len, n_p)."""
-        points = np.atleast_1d(np.asarray(fraction, dtype=float))
         if not self.entries:
-            return np.empty((len(points), 0))
+            return np.empty((np.size(fraction), 0))
+        points = np.atleast_1d(np.asarray(fraction, dtype=float))
         blocks = [e.at(v, points, side) for e, v in zip(self.entries, self.values, strict=True)]
         return np.hstack([np.empty((len(points), 0)), *blocks])
 

@@ -166,6 +166,13 @@ class OCP:
 
     def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
         """Return the numbers of a run: the declared ones, replaced by those ``given``."""
+        return self._values(given) if given else self._declared
+
+    @cached_property
+    def _declared(self) -> ParameterValues:
+        return self._values({})
+
+    def _values(self, given: Mapping[str, ArrayLike]) -> ParameterValues:
         values = ParameterValues.of(self.parameters, given)
         for entry, value in zip(values.entries, values.values, strict=True):
             if isinstance(entry, Signal) and self.steps and len(value) != self.steps + 1:
@@ -176,21 +183,12 @@ class OCP:
         return values
 
     def start(self, x0: ArrayLike | None = None) -> np.ndarray:
-        """Return the start of a run (nx,), checked; the declared one unless given."""
-        start = numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
-        excess = self.state_bounds.excess(start)
-        outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(start)))
-        if outside.size and not self.has_free_start:
-            i = int(outside[0])
-            low, high = (
-                np.asarray(self.state_bounds.lower)[i],
-                np.asarray(self.state_bounds.upper)[i],
-            )
-            raise ProblemError(
-                f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {start[i]} is outside "
-                f"its bounds [{low}, {high}]"
-            )
-        return start
+        """Return the start of a run (nx,), checked; the declared one unless given.
+
+        A start that is given may lie outside the state bounds: it is what it is, such as a
+        measured state, and no solver can change it. What that means the solution says.
+        """
+        return numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
 
     def describe(self) -> str:
         """Return the problem in mathematics, for a person."""
@@ -268,6 +266,7 @@ class OCP:
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
         model, x0 = self.model, self.start()
+        self._check_start_bounds(x0)
         if self.guess is not None:
             for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
                 self.guess.sample(part, np.array([0.0]), width)
@@ -286,3 +285,16 @@ class OCP:
                     f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {x0}, u = {u}: "
                     "a singular start, or NaN in the data"
                 )
+
+    def _check_start_bounds(self, x0: np.ndarray) -> None:
+        excess = self.state_bounds.excess(x0)
+        outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(x0)))
+        if outside.size and not self.has_free_start:
+            i = int(outside[0])
+            low, high = (
+                np.asarray(b)[i] for b in (self.state_bounds.lower, self.state_bounds.upper)
+            )
+            raise ProblemError(
+                f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {x0[i]} is outside "
+                f"its bounds [{low}, {high}]"
+            )

@@ -3,15 +3,26 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from time import perf_counter
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.guess import Guess
 from ocp.problem import OCP
 from ocp.solution import Solution
 
-Start = Guess | Solution
+
+class Start(Protocol):
+    """Where a solver may start: a ``Guess``, a ``Solution``, an earlier plan moved in time."""
+
+    @property
+    def duration(self) -> float | None:
+        """Final time minus t0 [s], where it is free."""
+        ...
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        """Return x, u or costate at fractions of the horizon, (len(fractions), width), or None."""
+        ...
 
 
 class Program(ABC):

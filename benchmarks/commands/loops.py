@@ -4,26 +4,46 @@ from argparse import ArgumentParser, Namespace
 
 from rich.console import Console
 
+from benchmarks.cases import arm_cases
 from benchmarks.commands.command import Command
-from benchmarks.commands.options import add_out, positive
+from benchmarks.commands.options import add_out, positive, seconds
 from benchmarks.mpc.arm_loop import SOLVERS
-from benchmarks.mpc.commands import print_endings, print_faults, print_loops
-from benchmarks.mpc.dial import COMPARED, SCENARIOS
+from benchmarks.mpc.commands import SHORT, print_faults, print_loops
+from benchmarks.mpc.dial import COMPARED, HORIZONS, SCENARIOS
+from ocp import ProblemError
 
 
 def _mpc_options(parser: ArgumentParser) -> None:
+    arms = [c.name.removesuffix("-sum") for c in arm_cases() if c.name.endswith("-sum")]
     parser.add_argument(
-        "--scenarios", nargs="*", default=SCENARIOS, metavar="S", help="arm-001 ..."
+        "--scenarios", nargs="+", default=(), choices=arms, metavar="S", help="arm-001 ..."
     )
     parser.add_argument("--controllers", nargs="+", default=COMPARED, choices=tuple(SOLVERS))
-    parser.add_argument("--short", action="store_true", help="terminal costs, delay, the mass")
+    parser.add_argument(
+        "--horizons", nargs="+", default=(), type=seconds, metavar="T", help="in seconds"
+    )
+    parser.add_argument(
+        "--short", nargs="*", choices=tuple(SHORT), help="these instead of the dial; none: all"
+    )
     add_out(parser)
 
 
 def _mpc(options: Namespace, console: Console) -> int:
-    if options.short:
-        return print_endings(console)
-    return print_loops(console, options.out, options.scenarios, options.controllers)
+    try:
+        return _chosen(options, console)
+    except ProblemError as error:  # a horizon that is shorter than the sampling interval
+        console.print(str(error), markup=False)
+        return 2
+
+
+def _chosen(options: Namespace, console: Console) -> int:
+    scenarios, horizons = options.scenarios, options.horizons
+    if options.short is None:
+        scenarios, horizons = scenarios or SCENARIOS, horizons or HORIZONS
+        return print_loops(console, options.out, scenarios, options.controllers, horizons)
+    for name in options.short or SHORT:
+        SHORT[name](console, scenarios, horizons)
+    return 0
 
 
 def _faults_options(parser: ArgumentParser) -> None:

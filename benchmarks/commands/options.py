@@ -2,6 +2,7 @@
 
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -27,6 +28,18 @@ def positive(text: str) -> int:
     number = int(text)
     if number < 1:
         raise ArgumentTypeError(f"{number} is not positive")
+    return number
+
+
+def seconds(text: str) -> float:
+    """Return a positive, finite duration [s].
+
+    Raises:
+        ArgumentTypeError: if it is not one; argparse says so.
+    """
+    number = float(text)
+    if not 0.0 < number < inf:
+        raise ArgumentTypeError(f"{text} s is no duration")
     return number
 
 

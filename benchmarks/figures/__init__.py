@@ -7,6 +7,7 @@ from pathlib import Path
 from benchmarks.figures import (
     basin,
     boundary_types,
+    cart_pole,
     closed_arm,
     constrained,
     descent,
@@ -84,6 +85,7 @@ FIGURES = (
     Figure("3.19", "total cost over the horizon", dial.total_costs),
     Figure("3.20", "boundary condition of shooting", closed_arm.boundary_residual),
     Figure("3.21", "terminations of Schuetz' method", closed_arm.terminations),
+    Figure("cart-pole", "a swing-up within force and track", cart_pole.swing_up),
     Figure("basin", "the basins of single shooting", basin.basins),
     Figure("links", "gap and effort over the number of links", over_links.links),
 )

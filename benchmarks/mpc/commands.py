@@ -6,13 +6,14 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.cases import arm_scenario
+from benchmarks.mpc import cart_pole_loop as cart_pole
 from benchmarks.mpc.dial import HORIZONS, crossings_table, sweep
 from benchmarks.mpc.endings import ENDINGS, loop_with
 from benchmarks.mpc.faults import SUBJECTS, campaign
 from benchmarks.mpc.late import DELAY, delayed_loops
 from benchmarks.mpc.loop_row import LoopRow
 from benchmarks.mpc.mass_loop import DT, receding
-from benchmarks.mpc.tables import faults_table, loops_table, said
+from benchmarks.mpc.tables import SETTLING, faults_table, loops_table, said
 
 _SHORT = (0.02, 0.06, 0.1, 0.2, 0.3)  # [s]
 _ENDED = ("arm-001", "arm-002", "arm-004")
@@ -22,31 +23,76 @@ _SHARES = {"cart": 0.8, "arm": 0.2}
 
 
 def print_loops(
-    console: Console, out: Path, scenarios: Sequence[str], controllers: Sequence[str]
+    console: Console,
+    out: Path,
+    scenarios: Sequence[str],
+    controllers: Sequence[str],
+    horizons: Sequence[float] = HORIZONS,
 ) -> int:
     """Run the arm's loops that are not in ``out`` yet and print the rows; return 0."""
-    rows = list(sweep(out, scenarios, controllers, HORIZONS))
+    rows = list(sweep(out, scenarios, controllers, horizons))
     console.print(loops_table(rows, "closed loops of the arm, dt = 20 ms, cost by the plant"))
     console.print(crossings_table(rows))
     return 0
 
 
-def print_endings(console: Console) -> int:
-    """Run short horizons with terminal costs, and a delay, and the mass of 2.92; return 0."""
+def print_endings(
+    console: Console, scenarios: Sequence[str] = (), horizons: Sequence[float] = ()
+) -> None:
+    """Run the arm with short horizons and each terminal cost."""
     rows = []
-    for name in _ENDED:
-        for horizon in _SHORT:
+    for name in scenarios or _ENDED:
+        for horizon in horizons or _SHORT:
             for kind in ENDINGS:
                 rollout = loop_with(arm_scenario(name), horizon, kind)
                 rows.append(LoopRow.of(name, "direct", horizon, rollout, ending=kind))
     console.print(loops_table(rows, "terminal costs"))
-    late = delayed_loops(_ENDED[0], _DELAYED)
-    rows = [LoopRow.of(_ENDED[0], what, _DELAYED, rollout) for what, rollout in late.items()]
+
+
+def print_delay(
+    console: Console, scenarios: Sequence[str] = (), horizons: Sequence[float] = ()
+) -> None:
+    """Run the arm with a computing delay."""
+    rows = [
+        LoopRow.of(name, what, horizon, rollout)
+        for name in scenarios or _ENDED[:1]
+        for horizon in horizons or (_DELAYED,)
+        for what, rollout in delayed_loops(name, horizon).items()
+    ]
     console.print(loops_table(rows, f"a computing delay of {1e3 * DELAY:g} ms"))
-    mass = {n: receding(n, bounded=True) for n in _MASS_HORIZONS}
+
+
+def print_mass(
+    console: Console, scenarios: Sequence[str] = (), horizons: Sequence[float] = ()
+) -> None:
+    """Run the mass of 2.92, which has no scenarios."""
+    steps = [max(1, round(h / DT)) for h in horizons] or _MASS_HORIZONS
+    mass = {n: receding(n, bounded=True) for n in steps}
     rows = [LoopRow.of("mass 2.92", "linear", DT * n, rollout) for n, rollout in mass.items()]
     console.print(loops_table(rows, "the mass of 2.92, |position| <= 2 m"))
-    return 0
+
+
+def print_cart_pole(
+    console: Console, scenarios: Sequence[str] = (), horizons: Sequence[float] = ()
+) -> None:
+    """Swing the cart-pole up, which has no scenarios but plants."""
+    rows = []
+    for setting in cart_pole.settings(horizons or cart_pole.HORIZONS):
+        rollout = cart_pole.loop(setting)
+        settled = cart_pole.up_since(rollout)
+        rows.append(
+            LoopRow.of(setting.plant, setting.solver, setting.horizon, rollout, settled=settled)
+        )
+    console.print(loops_table(rows, f"the cart-pole, {cart_pole.BOUNDS}", SETTLING))
+
+
+# What ``mpc --short`` runs besides the dial: (console, scenarios, horizons), none: its own.
+SHORT = {
+    "endings": print_endings,
+    "delay": print_delay,
+    "mass": print_mass,
+    "cart-pole": print_cart_pole,
+}
 
 
 def print_faults(console: Console, steps: int, seed: int) -> int:

@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.cases import all_cases, arm_scenario
@@ -70,7 +71,7 @@ def _cost(row: LoopRow, part: bool) -> float:
 
 def crossings_table(rows: Sequence[LoopRow]) -> Table:
     """Return, for each scenario, from which horizon on one controller costs less than another."""
-    table = Table(title="from which horizon on [s] (-: from none)")
+    table = Table(title=escape("from which horizon on [s] (-: from none)"))
     heads = ("direct beats instantaneous", "Schuetz beats instantaneous", "shooting beats Schuetz")
     table.add_column("scenario")
     for head in heads:

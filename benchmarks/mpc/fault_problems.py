@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benchmarks.mpc.faulty import Fault, Faulty, Schedule, active
+from benchmarks.mpc.altered import Altered
+from benchmarks.mpc.faulty import Fault, Schedule, Spoiled, active
 from models import Disc, DistanceCost, PlanarArm, redundancy_ocp
 from ocp import MPC, OCP, Applied, Box, Constraint, Model, Parameter, Plant
 from solvers import MultipleShooting, PrioritisedKinematics, track
@@ -76,7 +77,7 @@ def cart(faults: Schedule) -> Subject:
     return Subject(
         mpc=MPC(
             ocp=ocp,
-            solver=Faulty(_SOLVER, dt, faults),
+            solver=Altered(_SOLVER, Spoiled(dt, faults)),
             dt=dt,
             backup=lambda x, t: [-2.0 * x[0] - 2.0 * x[1]],
             parameters=lambda t: wanted(t, active(faults, t, dt)),
@@ -129,7 +130,7 @@ def arm(faults: Schedule) -> Subject:
     return Subject(
         mpc=MPC(
             ocp=ocp,
-            solver=Faulty(_SOLVER, dt, faults),
+            solver=Altered(_SOLVER, Spoiled(dt, faults)),
             dt=dt,
             applied=Applied("rate", Box(-_JOINTS, _JOINTS)),
             backup=backup.velocity,

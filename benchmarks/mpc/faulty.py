@@ -1,13 +1,11 @@
 """Things that fail on a schedule: a solver, a sensor, a computer that is too slow."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import MPC, OCP, Decision, Program, Solution, Solver, Start, Status
+from ocp import MPC, Decision, Solution, Status
 
 # What happens inside the solver, or to its answer.
 IN_SOLVER = ("exception", "no convergence", "iteration limit", "nan answer", "out of bounds")
@@ -60,42 +58,20 @@ def active(faults: Schedule, t: float, dt: float) -> Fault | None:
 
 
 @dataclass(frozen=True)
-class Faulty(Solver):
-    """A good solver that fails on a schedule.
+class Spoiled:
+    """What a schedule makes of a good solver's answers; for ``Altered``.
 
     Args:
-        inner: the good one.
         dt: sampling interval of the loop [s].
         faults: only those of ``IN_SOLVER`` matter here.
     """
 
-    inner: Solver
     dt: float
-    faults: Schedule = ()
+    faults: Schedule
 
-    def build(self, ocp: OCP) -> "FaultyProgram":
-        """Build the good one."""
-        return FaultyProgram(self, self.inner.build(ocp))
-
-
-@dataclass(frozen=True, eq=False)
-class FaultyProgram(Program):
-    """The compiled form."""
-
-    solver: Faulty
-    inner: Program
-
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
-    ) -> Solution:
-        """Solve, and then spoil it if it is time."""
-        solution = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
-        fault = active(self.solver.faults, t0, self.solver.dt)
+    def __call__(self, solution: Solution, t0: float) -> Solution:
+        """Spoil an answer if it is time, or raise."""
+        fault = active(self.faults, t0, self.dt)
         return _spoilt(solution, fault) if fault else solution
 
 

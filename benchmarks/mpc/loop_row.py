@@ -30,6 +30,8 @@ class LoopRow:
         statuses: decisions by how the solver ended.
         times: median, 99 % and worst time of a step [s].
         ended: why the loop ended early.
+        settled: from when on the plant is where it shall be [s]; None where it is not at the
+            end, or where that is not asked.
     """
 
     case: str
@@ -45,10 +47,18 @@ class LoopRow:
     statuses: dict[str, int]
     times: tuple[float, float, float]
     ended: str
+    settled: float | None = None
 
     @classmethod
     def of(
-        cls, case: str, controller: str, horizon: float, rollout: Rollout, *, ending: str = "none"
+        cls,
+        case: str,
+        controller: str,
+        horizon: float,
+        rollout: Rollout,
+        *,
+        ending: str = "none",
+        settled: float | None = None,
     ) -> "LoopRow":
         """Read it off a rollout."""
         residual = max((d.residual for d in rollout.decisions if d.status), default=np.inf)
@@ -72,6 +82,7 @@ class LoopRow:
             if len(times)
             else (0.0, 0.0, 0.0),
             ended=rollout.ended,
+            settled=settled,
         )
 
     @property

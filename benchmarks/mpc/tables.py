@@ -1,6 +1,6 @@
 """What the closed loops came to, as tables."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rich.markup import escape
 from rich.table import Table
@@ -11,27 +11,49 @@ from benchmarks.mpc.loop_row import LoopRow
 from ocp import Outcome
 
 
-def loops_table(rows: Sequence[LoopRow], title: str) -> Table:
-    """Return one line for each loop; times of one machine, in ms."""
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else form.format(value)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return " ".join(f"{name.lower()} {count}" for name, count in counts.items())
+
+
+# What a column says of a loop.
+CELLS: Mapping[str, Callable[[LoopRow], str]] = {
+    "case": lambda row: row.case,
+    "controller": lambda row: row.controller,
+    "horizon": lambda row: f"{row.horizon:g}",
+    "ending": lambda row: row.ending,
+    "cost 0.8 s": lambda row: _number(row.part, "{:.4f}"),
+    "cost": lambda row: _number(row.cost, "{:.4f}"),
+    "drift": lambda row: f"{row.drift:.1e}",
+    "violation": lambda row: f"{row.violation:.1e}",
+    "settled [s]": lambda row: _number(row.settled, "{:.2f}"),
+    "residual": lambda row: _number(row.residual, "{:.0e}"),
+    "outcomes": lambda row: _counts(row.outcomes),
+    "solver": lambda row: _counts(row.statuses),
+    "median [ms]": lambda row: f"{1e3 * row.times[0]:.1f}",
+    "99 %": lambda row: f"{1e3 * row.times[1]:.1f}",
+    "worst": lambda row: f"{1e3 * row.times[2]:.1f}",
+}
+ARM = tuple(name for name in CELLS if name != "settled [s]")
+SETTLING = tuple(n for n in CELLS if n not in ("ending", "cost 0.8 s", "drift", "residual"))
+
+
+def loops_table(rows: Sequence[LoopRow], title: str, columns: Sequence[str] = ARM) -> Table:
+    """Return one line for each loop; times of one machine, in ms.
+
+    Args:
+        rows: what to show.
+        title: above it.
+        columns: ``ARM``, ``SETTLING``, or others of ``CELLS``.
+    """
     table = Table(title=title)
-    names = ("case", "controller", "horizon", "ending", "cost 0.8 s", "cost", "drift", "violation")
-    for name in (*names, "residual", "outcomes", "solver", "median [ms]", "99 %", "worst"):
-        table.add_column(escape(name), justify="right", no_wrap=True)
+    for name in columns:
+        table.add_column(escape(name), justify="right", no_wrap=name not in ("outcomes", "solver"))
     for row in rows:
-        table.add_row(
-            row.case,
-            row.controller,
-            f"{row.horizon:g}",
-            row.ending,
-            _number(row.part, "{:.4f}"),
-            _number(row.cost, "{:.4f}"),
-            f"{row.drift:.1e}",
-            f"{row.violation:.1e}",
-            _number(row.residual, "{:.0e}"),
-            _counts(row.outcomes),
-            _counts(row.statuses),
-            *(f"{1e3 * time:.1f}" for time in row.times),
-        )
+        table.add_row(*(CELLS[name](row) for name in columns))
     return table
 
 
@@ -55,11 +77,3 @@ def said(report: Report) -> str:
         f"{report.slow} faults without recovery, {report.refused} refusals, "
         f"{report.differing} of {report.replayed} failures replay differently"
     )
-
-
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else form.format(value)
-
-
-def _counts(counts: dict[str, int]) -> str:
-    return " ".join(f"{name.lower()} {count}" for name, count in counts.items())

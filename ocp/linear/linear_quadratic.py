@@ -1,18 +1,15 @@
 """A linear-quadratic problem as arrays: sampled by one call on the data of a run."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
 from ocp.data import Data
 from ocp.errors import ProblemError
-from ocp.expressions import numbers
 from ocp.linear.node_function import NodeFunction
 from ocp.problem import OCP
 
@@ -159,14 +156,6 @@ class LinearQuadratic:
         """Number of steps N."""
         return self.ocp.steps or 0
 
-    def data(
-        self, x0: ArrayLike | None, t0: float, parameters: Mapping[str, ArrayLike] | None
-    ) -> Data:
-        """Return the data of a run; a measured start may lie outside the state bounds."""
-        given, name = self.ocp.x0 if x0 is None else x0, f"{self.ocp.name}: x0"
-        start = numbers(given, self.ocp.model.nx, name)
-        return Data(start, t0, self.ocp.parameter_values(parameters))
-
     def on(self, data: Data) -> LQData:
         """Return the numbers of a run.
 
@@ -199,7 +188,7 @@ class LinearQuadratic:
     @property
     def declared(self) -> Data:
         """The data of a run that leaves everything as declared."""
-        return self.data(None, 0.0, None)
+        return Data.of(self.ocp)
 
     @cached_property
     def nodes(self) -> np.ndarray:

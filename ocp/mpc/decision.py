@@ -27,45 +27,64 @@ class Outcome(Enum):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Decision:
-    """An input that may be applied: finite, within its bounds, and named for what it is.
+class Attempt:
+    """One step of a controller, whether or not an input came of it.
 
     Attributes:
         t: when the state was measured [s].
         applies_at: from when on the input is meant to act [s].
-        input: what the plant receives (m,).
-        outcome: which rung it comes from.
         status: how the solver ended at this step; None where it was not asked or raised.
         message: why the outcome is not ``OPTIMAL``, in words.
-        plan: the plan that the input comes from; None for the backup law.
         residual: the solver's optimality residual; inf without a plan of this step.
-        age: steps since that plan was made, 0 for a new one.
         late: whether a new plan came too late for this step.
         parameters: values of parameters and samples of signals of the horizon from
             ``applies_at`` on, by name, as the solver gets them.
         is_informed: False where the controller's ``parameters`` failed; there are none then.
-        clipped: by how much the input was moved to lie within its bounds.
         time_used: of this step [s].
     """
 
     t: float
     applies_at: float
-    input: np.ndarray
-    outcome: Outcome
     status: Status | None = None
     message: str = ""
-    plan: Solution | None = None
     residual: float = np.inf
-    age: int = 0
     late: bool = False
     parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
     is_informed: bool = True
-    clipped: float = 0.0
     time_used: float = 0.0
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Decision(Attempt):
+    """An input that may be applied: finite, within its bounds, and named for what it is.
+
+    Attributes:
+        input: what the plant receives (m,).
+        outcome: which rung it comes from.
+        plan: the plan that the input comes from; None for the backup law.
+        age: steps since that plan was made, 0 for a new one.
+        clipped: by how much the input was moved to lie within its bounds.
+    """
+
+    input: np.ndarray
+    outcome: Outcome
+    plan: Solution | None = None
+    age: int = 0
+    clipped: float = 0.0
+
+
 class ControlRefused(OCPError, RuntimeError):
-    """No input can be answered for: there is no usable plan, and no backup law that helps."""
+    """No input can be answered for: there is no usable plan, and no backup law that helps.
+
+    Args:
+        message: why.
+        attempt: the step that was refused; None where a law refuses.
+    """
+
+    def __init__(self, message: str, attempt: Attempt | None = None) -> None:
+        """Keep the step."""
+        super().__init__(message)
+        self.attempt = attempt
 
 
 class Controller(Protocol):

@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from math import isfinite
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +13,7 @@ from ocp.errors import ProblemError, UnsupportedProblem
 from ocp.expressions import instance
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE, Rule
-from ocp.mpc.decision import ControlRefused, Decision
+from ocp.mpc.decision import Attempt, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.ladder import Ladder, Moment
 from ocp.mpc.loop import Watch, closed_loop
@@ -20,7 +22,9 @@ from ocp.mpc.plant import Plant
 from ocp.mpc.rollout import Rollout
 from ocp.parameters import ParameterValues
 from ocp.problem import OCP
+from ocp.solution import Solution
 from ocp.solver import Solver, Start
+from ocp.status import Status
 
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
 
@@ -174,18 +178,20 @@ class MPC:
         if late:
             moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
         new = ladder.new(moment, plan) if plan is not None and not late else None
-        decision = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
-        if decision is None:
-            raise ControlRefused(f"t = {t:g} s: {'; '.join(moment.reasons)}")
+        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
         good = plan if late or new is not None else None
-        self.memory = self.memory.after(decision.input, good, self.steps_late)
-        return replace(
-            decision,
-            status=status,
-            message="; ".join(moment.reasons),
-            residual=plan.residual if plan else np.inf,
-            late=late,
-            time_used=perf_counter() - started,
+        self.memory = self.memory.after(choice and choice.input, good, self.steps_late)
+        said = _account(moment, plan, status, late, perf_counter() - started)
+        if choice is None:
+            raise ControlRefused(f"t = {t:g} s: {said['message']}", Attempt(**said))
+        followed = choice.plan
+        return Decision(
+            **said,
+            input=choice.input,
+            outcome=choice.outcome,
+            plan=followed,
+            age=round((moment.at - followed.t[0]) / self.dt) if followed else 0,
+            clipped=choice.clipped,
         )
 
     def run(
@@ -216,7 +222,7 @@ class MPC:
     def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
         """Collect what a decision is made from."""
         state, plan, at = np.array(x, dtype=float), self.memory.plan, t + self.delay
-        if state.shape != (self.ocp.model.nx,) or not np.isfinite(t):
+        if state.shape != (self.ocp.model.nx,) or not isfinite(t):
             raise ProblemError(
                 f"MPC of {self.ocp.name}: x has shape {state.shape} at t = {t}; "
                 f"({self.ocp.model.nx},) and a finite time are needed"
@@ -226,7 +232,7 @@ class MPC:
         is_measured = bool(np.isfinite(state).all())
         if not is_measured:  # without a plan the backup law sees what was measured
             state = state if plan is None else plan.state(at)
-        elif self.compensate:
+        elif self.compensate and self.memory.pending:
             state = self._predicted(state, t, values.at((at - since) / self.ocp.duration)[0])
         return Moment(
             t=float(t),
@@ -260,3 +266,20 @@ class MPC:
         for k, given in enumerate(self.memory.pending):
             x = self._ladder.advanced(x, given, t + k * self.dt, p)
         return x
+
+
+def _account(
+    moment: Moment, plan: Solution | None, status: Status | None, late: bool, used: float
+) -> dict[str, Any]:
+    """Return what is said of a step whatever came of it, by the names of ``Attempt``."""
+    return {
+        "t": moment.t,
+        "applies_at": moment.at,
+        "status": status,
+        "message": "; ".join(moment.reasons),
+        "residual": plan.residual if plan else np.inf,
+        "late": late,
+        "parameters": moment.values.as_dict() if moment.is_informed else {},
+        "is_informed": moment.is_informed,
+        "time_used": used,
+    }

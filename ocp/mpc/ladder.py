@@ -1,16 +1,18 @@
 """From a measurement to an input that somebody answers for: the rungs, best first."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 
 from ocp.constraint import Box
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE, Rule, asked
-from ocp.mpc.decision import ControlRefused, Decision, Outcome
+from ocp.mpc.decision import ControlRefused, Outcome
 from ocp.mpc.rehearsal import Ends, Rehearsal
-from ocp.mpc.shift import controls, shifted
+from ocp.mpc.shift import Shifted, controls
 from ocp.parameters import ParameterValues
 from ocp.problem import OCP
 from ocp.solution import Solution
@@ -25,14 +27,16 @@ _USABLE = frozenset(
         Status.COST_ROSE,
         Status.ITERATION_LIMIT,
         Status.NO_PROGRESS,
+        # A measured state may violate what from the next node on can be met.
+        Status.INFEASIBLE,
     }
 )
 # Of an instant, relative to the interval: later than the end by less is the end.
 _ROUNDING = 1e-6
+_NO_PARAMETERS = np.empty(0)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Moment:
+class Moment(NamedTuple):
     """What a decision is made from.
 
     Attributes:
@@ -57,12 +61,28 @@ class Moment:
     values: ParameterValues
     since: float
     is_informed: bool
-    reasons: list[str] = field(default_factory=list)
+    reasons: list[str]
+
+
+class Choice(NamedTuple):
+    """An input that a rung answers for.
+
+    Attributes:
+        outcome: which rung.
+        input: within its bounds (m,).
+        clipped: by how much it was moved to lie there.
+        plan: that it comes from; None for the backup law.
+    """
+
+    outcome: Outcome
+    input: np.ndarray
+    clipped: float
+    plan: Solution | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ladder:
-    """The rungs of one controller; each returns a decision, or None and a reason.
+    """The rungs of one controller; each returns a choice, or None and a reason.
 
     Attributes:
         ocp: the problem.
@@ -97,7 +117,7 @@ class Ladder:
                 x0=moment.start,
                 t0=moment.at,
                 parameters=moment.values.as_dict(),
-                guess=shifted(last, moment.at) if last else self.guess,
+                guess=Shifted(last, moment.at) if last else self.guess,
             )
         except INSIDE as error:
             moment.reasons.append(f"{type(error).__name__} inside the solver: {error}")
@@ -110,12 +130,12 @@ class Ladder:
             moment.reasons.append(f"{plan.status.name}: {plan.message or plan.status.value}")
         return plan, plan.status
 
-    def new(self, moment: Moment, plan: Solution) -> Decision | None:
+    def new(self, moment: Moment, plan: Solution) -> Choice | None:
         """Follow the new plan."""
         outcome = Outcome.OPTIMAL if plan.status is Status.SOLVED else Outcome.FEASIBLE
         return self._following(plan, moment, outcome)
 
-    def shifted(self, moment: Moment) -> Decision | None:
+    def shifted(self, moment: Moment) -> Choice | None:
         """Follow the last good plan, if its remainder meets the constraints."""
         if moment.plan is None:
             moment.reasons.append("there is no earlier plan")
@@ -126,7 +146,7 @@ class Ladder:
             return None
         return self._following(moment.plan, moment, Outcome.SHIFTED)
 
-    def backed_up(self, moment: Moment, last: np.ndarray | None) -> Decision | None:
+    def backed_up(self, moment: Moment, last: np.ndarray | None) -> Choice | None:
         """Ask the backup law; without one hold the last input."""
         given, needed = last, self.applied.size(self.ocp)
         if self.backup is not None:
@@ -141,7 +161,7 @@ class Ladder:
         if len(given) != needed:
             moment.reasons.append(f"the backup law returned {len(given)} numbers, not {needed}")
             return None
-        return self._decision(moment, given, Outcome.BACKUP, np.inf)
+        return self._within(moment, given, Outcome.BACKUP)
 
     def advanced(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the model's state one interval after t [s] under an input, parameters held."""
@@ -155,66 +175,79 @@ class Ladder:
     def _excess(self, plan: Solution, moment: Moment) -> tuple[float, str]:
         """Return by how much a new plan violates the constraints; inf where it is none."""
         if plan.status.is_success:
+            if not self._is_constrained:
+                return 0.0, ""
             u, ends = plan.u[: len(plan.t) - 1], self._ends(moment, plan.t)
             return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
-        if plan.status in _USABLE:
-            return self._rehearsed(plan, moment)
-        return np.inf, plan.status.value
+        if plan.status not in _USABLE:
+            return np.inf, plan.status.value
+        return self._rehearsed(plan, moment)
 
     def _rehearsed(self, plan: Solution, moment: Moment) -> tuple[float, str]:
-        """Run the model from now under what is left of a plan, and check the constraints."""
+        """Run the model from now under what is left of a plan, and check the constraints.
+
+        Those of the end are asked of a whole plan only: a remainder ends before its horizon.
+        """
         times = moment.at + plan.t - plan.t[0]
         left = int((times[:-1] < plan.t[-1] - _ROUNDING * self.dt).sum())
         if not left:
             return np.inf, "nothing is left of it"
         times = times[: left + 1]
-        u = controls(plan, times[:-1])
-        trial = self._rehearsal(left).of(moment.start, u, times, self._ends(moment, times))
-        return trial.excess, trial.worst
+        u, rehearsal = controls(plan, times[:-1]), self._rehearsal(left)
+        trial = rehearsal.of(moment.start, u, times, self._ends(moment, times))
+        found = trial.excess, trial.worst
+        if left < len(plan.t) - 1 or not isfinite(trial.excess):
+            return found
+        p = self._parameters(moment, times[-1])
+        return max(found, rehearsal.end_excess(trial.x[-1], times[-1], p))
 
-    def _following(self, plan: Solution, moment: Moment, outcome: Outcome) -> Decision | None:
-        """Return the decision to follow a plan now; None where its input is none."""
+    def _following(self, plan: Solution, moment: Moment, outcome: Outcome) -> Choice | None:
+        """Follow a plan now; None where its input is none."""
         # A control that moves is held at its value in the middle of the interval, its mean but
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
-        u = controls(plan, np.array([moment.at + middle]))[0]
-        given = self.applied.of(self.ocp, moment.start, u, moment.at, self._now(moment))
-        decision = self._decision(moment, given, outcome, self.tolerance)
-        if decision is None:
-            return None
-        return replace(decision, plan=plan, age=round((moment.at - plan.t[0]) / self.dt))
+        u = controls(plan, moment.at + middle)
+        given = self.applied.of(
+            self.ocp, moment.start, u, moment.at, self._parameters(moment, moment.at)
+        )
+        return self._within(moment, given, outcome, plan)
 
-    def _decision(
-        self, moment: Moment, given: np.ndarray, outcome: Outcome, most: float
-    ) -> Decision | None:
-        """Return a decision, its input clipped; None if it is not finite or clipped by more."""
-        excess = float(self.box.excess(given).max(initial=0.0))
-        if not np.isfinite(given).all() or excess > most:
+    def _within(
+        self, moment: Moment, given: np.ndarray, outcome: Outcome, plan: Solution | None = None
+    ) -> Choice | None:
+        """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
+        inside = self.box.clip(given)
+        # Where an input is not finite, nor is this.
+        excess = float(np.abs(given - inside).max(initial=0.0))
+        if not isfinite(excess):
+            moment.reasons.append(f"the input {given} is not finite")
+            return None
+        if plan is not None and excess > self.tolerance:
             moment.reasons.append(f"the input {given} leaves its bounds by {excess:.3g}")
             return None
-        return Decision(
-            t=moment.t,
-            applies_at=moment.at,
-            input=self.box.clip(given),
-            outcome=outcome,
-            parameters=moment.values.as_dict() if moment.is_informed else {},
-            is_informed=moment.is_informed,
-            clipped=excess,
-        )
+        return Choice(outcome, inside, excess, plan)
 
     def _ends(self, moment: Moment, times: np.ndarray) -> Ends:
         """Return the parameters at both ends of the intervals between some instants (N + 1,)."""
         return moment.values.on((times - moment.since) / self.ocp.duration)
 
-    def _now(self, moment: Moment) -> np.ndarray:
-        """Return the parameters when the input acts (n_p,)."""
-        return moment.values.at((moment.at - moment.since) / self.ocp.duration)[0]
+    def _parameters(self, moment: Moment, t: float) -> np.ndarray:
+        """Return the parameters at an instant (n_p,)."""
+        if not self.ocp.parameters:
+            return _NO_PARAMETERS
+        return moment.values.at((t - moment.since) / self.ocp.duration)[0]
 
     def _rehearsal(self, n: int) -> Rehearsal:
         """Roll-outs over n intervals, prepared once for each n."""
         if n not in self._rehearsals:
             self._rehearsals[n] = Rehearsal(self.ocp, n, self.compiled)
         return self._rehearsals[n]
+
+    @cached_property
+    def _is_constrained(self) -> bool:
+        """Whether there is anything along the way that a plan could violate."""
+        ocp = self.ocp
+        return bool(ocp.at("path")) or ocp.state_bounds.is_active or ocp.control_bounds.is_active
 
     @cached_property
     def box(self) -> Box:

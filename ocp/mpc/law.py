@@ -31,7 +31,7 @@ class Law:
     @classmethod
     def following(cls, plan: Solution) -> "Law":
         """Return the law that feeds a plan forward, whatever the state; its last input is held."""
-        return cls(law=lambda x, t: controls(plan, np.array([t]))[0])
+        return cls(law=lambda x, t: controls(plan, t))
 
     def reset(self) -> None:
         """Do nothing: a law has no memory."""

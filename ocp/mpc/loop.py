@@ -16,7 +16,7 @@ from ocp.mpc.rollout import Rollout
 from ocp.problem import OCP
 
 Fault = Callable[[np.ndarray, float], np.ndarray]
-Watch = Callable[[np.ndarray, Decision], None]
+Watch = Callable[[np.ndarray, Decision | ControlRefused], None]
 
 
 def closed_loop(
@@ -45,7 +45,7 @@ def closed_loop(
         seed: of noise and jitter.
         initial_input: acts during the delay at the start (m,); default: zero, within bounds.
         sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
-        watch: called with every measurement and decision, such as a ``FlightRecorder``.
+        watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is.
 
     Raises:
         ProblemError: if the plant takes another input than the controller sends, the duration is
@@ -69,6 +69,8 @@ def closed_loop(
         try:
             decision = controller.step(told, journal.running.t)
         except ControlRefused as refusal:
+            if watch:
+                watch(told, refusal)
             journal.ended = str(refusal)
             break
         if decision.input.shape != (m,):

@@ -21,7 +21,12 @@ class Memory:
     input: np.ndarray | None = None
     pending: tuple[np.ndarray, ...] = ()
 
-    def after(self, given: np.ndarray, plan: Solution | None, steps_late: int) -> "Memory":
-        """Return what is known after a step: its input, and its plan if there is a good one."""
+    def after(self, given: np.ndarray | None, plan: Solution | None, steps_late: int) -> "Memory":
+        """Return what is known after a step: its input, and its plan if there is a good one.
+
+        A step that was refused has no input; a plan that came too late for it is kept.
+        """
+        if given is None:
+            return Memory(plan or self.plan, self.input, self.pending)
         ahead = (*self.pending, given)
         return Memory(plan or self.plan, given, ahead[max(0, len(ahead) - steps_late) :])

@@ -1,36 +1,31 @@
 """The flight recorder: every step on disk as it happens, and any of them played again."""
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, NamedTuple, Self
+from typing import BinaryIO, Self
 
 import numpy as np
 
 from ocp.errors import ProblemError
-from ocp.mpc.decision import ControlRefused, Decision, Outcome
+from ocp.mpc.decision import ControlRefused, Decision
 from ocp.mpc.driver import MPC
 from ocp.mpc.memory import Memory
+from ocp.mpc.record import Record, header, packed, read_header, records
 from ocp.solution import Solution
-from ocp.status import Status
-
-_FORMAT = "flight record, version 1"
-_PLAN = ("t", "x", "x0", "costate", "u")
 
 
 class FlightRecorder:
-    """Writes a record after every decision of an ``MPC``.
+    """Writes a record after every step of an ``MPC``, whether it was decided or refused.
 
-    The file begins with a line of JSON that says whose it is. A record is a line of JSON with
-    everything that is not an array, and then the arrays as doubles: what was measured, the
-    parameters, the input, and the plan where it is another one than before. A record that was
-    cut off by a crash is ignored later. Use it as a context manager and give its ``watch`` to
-    the loop.
+    The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
+    the shapes of its arrays, these as doubles (what was measured, the input, the plan where
+    another one was found good, the parameters), and the message. A record that was cut off by a
+    crash is ignored later. Use it as a context manager and give its ``watch`` to the loop.
 
     Args:
-        mpc: whose decisions are recorded.
+        mpc: whose steps are recorded.
         path: the file, overwritten.
     """
 
@@ -39,8 +34,8 @@ class FlightRecorder:
         self._mpc, self.path = mpc, Path(path)
         self._last: Solution | None = None
         self._file: BinaryIO = self.path.open("wb")
-        header = {"format": _FORMAT, "problem": mpc.ocp.name, "solver": repr(mpc.solver)}
-        self._file.write(json.dumps(header).encode() + b"\n")
+        names = [entry.name for entry in mpc.ocp.parameters]
+        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names))
 
     def __enter__(self) -> Self:
         """Return the recorder."""
@@ -55,48 +50,15 @@ class FlightRecorder:
         """Close the file."""
         self._file.close()
 
-    def watch(self, measured: np.ndarray, decision: Decision) -> None:
-        """Write down a step of the controller that has just decided."""
-        arrays = {"measured": measured, "input": decision.input}
-        arrays |= {f"p/{name}": value for name, value in decision.parameters.items()}
-        entry: dict[str, Any] = {
-            "t": decision.t,
-            "outcome": decision.outcome.name,
-            "status": decision.status.name if decision.status else None,
-            "late": decision.late,
-            "informed": decision.is_informed,
-            "message": decision.message,
-            "age": decision.age,
-            "clipped": decision.clipped,
-            "residual": decision.residual,
-            "time_used": decision.time_used,
-        }
+    def watch(self, measured: np.ndarray, decided: Decision | ControlRefused) -> None:
+        """Write down a step of the controller that has just decided, or refused."""
+        step = decided.attempt if isinstance(decided, ControlRefused) else decided
+        if step is None:
+            raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
         plan = self._mpc.memory.plan
-        if plan is not None and plan is not self._last:
-            entry["plan"] = {"kind": plan.control_kind, "status": plan.status.name}
-            arrays |= {f"plan/{name}": getattr(plan, name) for name in _PLAN}
-            self._last = plan
-        entry["arrays"] = {name: np.shape(array) for name, array in arrays.items()}
-        body = b"".join(np.ascontiguousarray(a, dtype=float).tobytes() for a in arrays.values())
-        self._file.write(b"%s\n%s" % (json.dumps(entry).encode(), body))
+        self._file.write(packed(measured, step, plan if plan is not self._last else None))
         self._file.flush()
-
-
-class Record(NamedTuple):
-    """One step from the file: what is not an array, and the arrays by name."""
-
-    entry: Mapping[str, Any]
-    arrays: Mapping[str, np.ndarray]
-
-    @property
-    def outcome(self) -> Outcome:
-        """Which rung the input came from."""
-        return Outcome[self.entry["outcome"]]
-
-    @property
-    def input(self) -> np.ndarray:
-        """What was sent (m,)."""
-        return self.arrays["input"]
+        self._last = plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,35 +75,12 @@ class Replay:
 
     @property
     def is_exact(self) -> bool:
-        """Whether input (to the last bit) and outcome are the recorded ones."""
-        return (
-            self.decision is not None
-            and self.decision.outcome is self.record.outcome
-            and np.array_equal(self.decision.input, self.record.input)
+        """Whether input (to the last bit) and outcome are the recorded ones, or it is refused."""
+        if self.decision is None or self.record.input is None:
+            return self.decision is None and self.record.input is None
+        return self.decision.outcome is self.record.outcome and np.array_equal(
+            self.decision.input, self.record.input
         )
-
-
-def records(path: str | Path) -> Iterator[Record]:
-    """Yield the complete records of a file, in order.
-
-    Raises:
-        ProblemError: if it is no flight record.
-    """
-    with Path(path).open("rb") as file:
-        _header(file, path)
-        while line := file.readline():
-            try:
-                entry = json.loads(line)
-            except (json.JSONDecodeError, UnicodeDecodeError):
-                return
-            arrays = {}
-            for name, shape in entry["arrays"].items():
-                count = int(np.prod(shape))
-                raw = file.read(8 * count)
-                if len(raw) < 8 * count:
-                    return
-                arrays[name] = np.frombuffer(raw).reshape(shape)
-            yield Record(entry, arrays)
 
 
 def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
@@ -165,10 +104,10 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
         ProblemError: if the file is not of this problem and solver, or ends before a step.
     """
     with Path(path).open("rb") as file:
-        header = _header(file, path)
+        said = read_header(file, path)
     for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
-        if header[name] != own:
-            raise ProblemError(f"{path} records the {name} '{header[name]}', not '{own}'")
+        if said[name] != own:
+            raise ProblemError(f"{path} records the {name} '{said[name]}', not '{own}'")
     wanted, known = set(steps), _Known()
     again, memory = replace(mpc, parameters=known), Memory()
     for k, record in enumerate(records(path)):
@@ -186,57 +125,38 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
         raise ProblemError(f"{path} has no step {min(wanted)}")
 
 
-def _header(file: BinaryIO, path: str | Path) -> dict[str, str]:
-    try:
-        header = json.loads(file.readline())
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ProblemError(f"{path} is no flight record") from error
-    if not isinstance(header, dict) or header.get("format") != _FORMAT:
-        raise ProblemError(f"{path} is no {_FORMAT}")
-    return header
-
-
 @dataclass(eq=False)
 class _Known:
     """The parameters as they were known at a recorded step, instead of the controller's own."""
 
     record: Record | None = None
 
-    def __call__(self, t: float) -> dict[str, np.ndarray]:
-        if self.record is None or not self.record.entry["informed"]:
+    def __call__(self, t: float) -> Mapping[str, np.ndarray]:
+        if self.record is None or not self.record.is_informed:
             raise ProblemError("nobody knew them")
-        return _parameters(self.record)
+        return self.record.parameters
 
 
 def _again(mpc: MPC, record: Record) -> Decision | None:
     try:
-        return mpc.step(
-            record.arrays["measured"],
-            record.entry["t"],
-            late=record.entry["late"],
-        )
+        return mpc.step(record.measured, record.t, late=record.late)
     except ControlRefused:
         return None
 
 
-def _parameters(record: Record) -> dict[str, np.ndarray]:
-    return {name[2:]: array for name, array in record.arrays.items() if name.startswith("p/")}
-
-
 def _plan(mpc: MPC, record: Record) -> Solution | None:
-    if "plan" not in record.entry:
+    if record.plan is None:
         return None
-    t, x, x0, costate, u = (record.arrays[f"plan/{name}"] for name in _PLAN)
     return Solution(
         problem=mpc.ocp,
         solver=repr(mpc.solver),
-        status=Status[record.entry["plan"]["status"]],
-        t=t,
-        x=x,
-        x0=x0,
-        costate=costate,
-        u=u,
-        control_kind=record.entry["plan"]["kind"],
+        status=record.plan.status,
+        t=record.plan.t,
+        x=record.plan.x,
+        x0=record.plan.x0,
+        costate=record.plan.costate,
+        u=record.plan.u,
+        control_kind=record.plan.kind,
         cost=0.0,
-        parameters=_parameters(record),
+        parameters=record.parameters,
     )

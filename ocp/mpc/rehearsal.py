@@ -82,6 +82,15 @@ class Rehearsal:
             found.append(_largest("constraint", self._path_names, excess))
         return max(found)
 
+    def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
+        """Return the largest violation of a terminal constraint by a final state (nx,)."""
+        terminal = self.ocp.at("terminal")
+        if not terminal:
+            return 0.0, ""
+        rows = np.array(self.ocp.functions.terminal(x, t, p)).T
+        names = tuple(c.name for c in terminal for _ in range(c.size))
+        return _largest("terminal constraint", names, stacked_box(terminal).excess(rows))
+
     @cached_property
     def _rollout(self) -> Buffered:
         step = (_compiled_step if self.compiled else _step)(self.ocp)

@@ -1,44 +1,73 @@
 """An earlier plan, seen from a later instant: what is left of it, and as a first guess."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from ocp.guess import Guess
+from ocp.errors import ProblemError
 from ocp.solution import Solution
 
 
-def shifted(plan: Solution, t0: float) -> Guess:
-    """Return a plan moved to start at t0 [s], as a first guess for the same horizon.
+@dataclass(frozen=True, eq=False)
+class Shifted:
+    """A plan moved to start later, as a first guess for the same horizon.
 
-    States, controls and costates are read off at the later instants. Beyond its end the plan
-    goes on as it ended: states along their last slope, controls held, costates at their final
-    value (what the transversality condition makes them anyway).
+    States, controls and costates are read off at the later instants, those that a solver asks
+    for and no others. Beyond its end the plan goes on as it ended: states along their last
+    slope, controls held, costates at their final value (what the transversality condition makes
+    them anyway).
+
+    Attributes:
+        plan: the earlier one.
+        t0: where it is to start [s].
     """
-    times = plan.t - plan.t[0] + t0
-    nx = plan.x.shape[1]
-    both = _along(times, plan.t, np.hstack([plan.x, plan.costate]))
-    x, costate = both[:, :nx], both[:, nx:]
-    beyond = np.maximum(times - plan.t[-1], 0.0)[:, None]
-    x += beyond * ((plan.x[-1] - plan.x[-2]) / (plan.t[-1] - plan.t[-2]))
-    return Guess(x=x, u=controls(plan, times), costate=costate)
+
+    plan: Solution
+    t0: float
+
+    @property
+    def duration(self) -> None:
+        """Nothing: the horizon is fixed."""
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray:
+        """Return x, u or costate at fractions of the horizon, (len(fractions), width)."""
+        plan, times = self.plan, self.t0 + fractions * self.plan.duration
+        match part:
+            case "x":
+                rows = _along(times, plan.t, plan.x)
+            case "u":
+                rows = controls(plan, times)
+            case _:
+                rows = _along(_within(times, plan.t), plan.t, plan.costate)
+        if rows.shape[1] != width:
+            raise ProblemError(f"guess: the plan has {rows.shape[1]} of {part}, {width} are needed")
+        return rows
 
 
-def controls(plan: Solution, times: np.ndarray) -> np.ndarray:
-    """Return the controls of a plan at some instants (K,) -> (K, nu), the last one held.
+def controls(plan: Solution, times: np.ndarray | float) -> np.ndarray:
+    """Return the controls of a plan at one instant (nu,), or at some (K, nu), the last one held.
 
     An extremal's are interpolated from its nodes: a guess needs no more, and the minimising
     control would have to be solved for.
     """
     if plan.control_kind == "held":
-        index = np.searchsorted(plan.t, times + 1e-9 * plan.duration, side="right") - 1
-        return plan.u[np.minimum(np.maximum(index, 0), len(plan.u) - 1)]
-    return _along(times, plan.t, plan.u)
+        return plan.u[_interval(times + 1e-9 * plan.duration, plan.t)]
+    return _along(_within(times, plan.t), plan.t, plan.u)
 
 
-def _along(times: np.ndarray, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """``np.interp`` of all columns at once."""
-    left = np.searchsorted(nodes, times, side="right") - 1
-    left = np.minimum(np.maximum(left, 0), len(nodes) - 2)
-    share = (times - nodes[left]) / (nodes[left + 1] - nodes[left])
-    share = np.minimum(np.maximum(share, 0.0), 1.0)[:, None]
-    below = rows[left]
-    return below + share * (rows[left + 1] - below)
+def _within(times: np.ndarray | float, nodes: np.ndarray) -> np.ndarray:
+    return np.minimum(np.maximum(times, nodes[0]), nodes[-1])
+
+
+def _along(times: np.ndarray | float, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Interpolate all columns at once, beyond the ends along the outermost slopes."""
+    left = _interval(times, nodes)
+    right = left + 1
+    start, below = nodes[left], rows[left]
+    share = (times - start) / (nodes[right] - start)
+    return below + share[..., None] * (rows[right] - below)
+
+
+def _interval(times: np.ndarray | float, nodes: np.ndarray) -> np.ndarray | np.intp:
+    """Return the interval that each instant lies in; the outermost ones have no end."""
+    return nodes[1:-1].searchsorted(times, side="right")

@@ -135,7 +135,7 @@ class AugmentedLagrangianProgram(Program):
     ) -> Solution:
         """Alternate between the inner solver and the multipliers."""
         started = perf_counter()
-        data = Data(self.ocp.start(x0), t0, self.ocp.parameter_values(parameters))
+        data = Data.of(self.ocp, x0, t0, parameters)
         ascent = Ascent(self, data)
         status, message = ascent.climb(guess)
         return ascent.solution(status, message, perf_counter() - started)

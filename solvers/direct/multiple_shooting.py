@@ -124,7 +124,7 @@ class MultipleShootingProgram(Program):
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started = perf_counter()
         ocp, tr = self.transcription.ocp, self.transcription
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         bounds, p = tr.bounds(data), tr.data_vector(data)
         z, u = self._first_iterate(data, guess or ocp.guess)
         w0 = np.clip(tr.join(z, u), bounds["lbx"], bounds["ubx"])
@@ -200,7 +200,8 @@ class MultipleShootingProgram(Program):
         if answer.success and not violated:
             excess, row = self._start_violation(answer)
             if excess > _VIOLATED:
-                return Status.INFEASIBLE, self._where(answer, data, excess, row)
+                where = self._where(answer, data, excess, row)
+                return Status.INFEASIBLE, f"{where}, by the given start itself"
             error, node = self._integration_error(answer, data)
             if error <= self.solver.accuracy:
                 return Status.SOLVED, ""
@@ -213,15 +214,22 @@ class MultipleShootingProgram(Program):
         return Status.FAILED, f"{self.solver.backend} says {answer.word}. {where}".strip()
 
     def _start_violation(self, answer: Answer) -> tuple[float, Row | None]:
-        """By how much the given start itself violates a path constraint, which is not imposed."""
-        rows, path = self.transcription.rows, self.transcription.ocp.at("path")
-        here = [i for i, row in enumerate(rows) if row.place == "path" and row.node == 0]
-        if not here:
-            return 0.0, None
-        box = Box(*(np.concatenate([getattr(c, s) for c in path]) for s in ("lower", "upper")))
-        excess = box.excess(answer.g[here])
-        worst = int(excess.argmax())
-        return float(excess[worst]), rows[here[worst]]
+        """By how much the given start itself violates what is not imposed there, and what."""
+        tr, ocp = self.transcription, self.transcription.ocp
+        found: list[tuple[float, Row]] = []
+        bounds = ocp.state_bounds.excess(answer.w[: ocp.model.nx])
+        for name, excess in zip(ocp.model.x_names, bounds, strict=True):
+            found.append((float(excess), Row(f"bound of {name}", "path", 0, 0.0, 0.0)))
+        here = [i for i, row in enumerate(tr.rows) if row.place == "path" and row.node == 0]
+        path = Box(
+            *(
+                np.concatenate([[], *[getattr(c, side) for c in ocp.at("path")]])
+                for side in ("lower", "upper")
+            )
+        )
+        for i, excess in zip(here, path.excess(answer.g[here]), strict=True):
+            found.append((float(excess), tr.rows[i]))
+        return max(found, key=lambda pair: pair[0])
 
     def _integration_error(self, answer: Answer, data: Data) -> tuple[float, int]:
         """By how much half the step moves the end of an interval, relative to 1 + abs(x)."""

@@ -185,7 +185,7 @@ class SchuetzProgram(Program):
     ) -> Solution:
         """Descend from the guessed controls, zero unless given."""
         started = perf_counter()
-        data = Data(self.ocp.start(x0), t0, self.ocp.parameter_values(parameters))
+        data = Data.of(self.ocp, x0, t0, parameters)
         descent = _Descent(self, data, guess or self.ocp.guess)
         with np.errstate(over="ignore", invalid="ignore"):  # a descent may climb to overflow
             status = descent.descend()

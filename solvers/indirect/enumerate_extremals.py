@@ -109,7 +109,7 @@ def enumerate_extremals(
     _refuse(ocp)
     kept = Kept.of(ocp)
     redundant_by_one(kept)
-    data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+    data = Data.of(ocp, x0, t0, parameters)
     schedule, reverse = Schedule.of(ocp, data, _STEPS), Reverse.of(ocp, _STEPS, RK4())
     start, end = kept.at(t0, schedule.p_first), kept.at(t0 + schedule.duration, schedule.p_last)
     scanner = Scanner(

@@ -117,7 +117,7 @@ class IndirectShootingProgram(Program):
         """Solve for these data; a guess needs costates, else they start at zero."""
         started = perf_counter()
         ocp = self.extremals.ocp
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         start = self._first_unknowns(data, guess or ocp.guess)
         results = [self._newton(data, 1.0, start)]
         if not results[0].converged and self.solver.continuation:

@@ -132,7 +132,7 @@ class ReverseShootingProgram(Program):
         """
         started = perf_counter()
         ocp = self.reverse.extremals.ocp
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         task = _Task(self, data, Schedule.of(ocp, data, self.solver.steps))
         first = guess or ocp.guess
         rows = first.sample("x", np.array([1.0]), ocp.model.nx) if first else None

@@ -40,7 +40,7 @@ class Run:
             ProblemError: if the data do not fit the problem, or make a weight indefinite.
         """
         started = perf_counter()
-        data = lq.data(x0, t0, parameters)
+        data = Data.of(lq.ocp, x0, t0, parameters)
         return cls(lq, data, lq.on(data), started)
 
     def solution(

@@ -144,7 +144,7 @@ class GreedyProgram(Program):
         """Go from step to step; of a guess only the first control is used."""
         started = perf_counter()
         ocp, n, m = self.ocp, self.n, self.ocp.model
-        data = Data(ocp.start(x0), t0, ocp.parameter_values(parameters))
+        data = Data.of(ocp, x0, t0, parameters)
         nodes = np.linspace(0.0, 1.0, n + 1)
         guess = guess or ocp.guess
         first = guess.sample("u", nodes[:1], m.nu) if guess else None

@@ -185,7 +185,7 @@ class GridDPProgram(Program):
         self, *, t0: float = 0.0, parameters: Mapping[str, ArrayLike] | None = None
     ) -> Table:
         """Return value function, policy and reachable sets for these data."""
-        return self._tables(Data(np.asarray(self.ocp.x0), t0, self._values(parameters)))[-1]
+        return self._tables(Data.of(self.ocp, t0=t0, parameters=parameters))[-1]
 
     def run(
         self,
@@ -197,7 +197,7 @@ class GridDPProgram(Program):
     ) -> Solution:
         """Fill the table, unless it is the last one, and follow its policy; no guess is used."""
         started = perf_counter()
-        data = Data(self.ocp.start(x0), t0, self._values(parameters))
+        data = Data.of(self.ocp, x0, t0, parameters)
         for value, axis, name in zip(data.x0, self.grid.axes, self.ocp.model.x_names, strict=True):
             if not axis.lower <= value <= axis.upper:
                 raise ProblemError(
@@ -230,9 +230,6 @@ class GridDPProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=perf_counter() - started,
         )
-
-    def _values(self, parameters: Mapping[str, ArrayLike] | None):
-        return self.ocp.parameter_values(parameters)
 
     def _tables(self, data: Data) -> tuple[Table, ...]:
         key = b"".join([np.float64(data.t0).tobytes(), *[v.tobytes() for v in data.values.values]])

@@ -1,13 +1,13 @@
-"""A cart with bounded force, and solvers that fail on demand."""
+"""A cart with bounded force, and a solver that fails on demand."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, Box, Constraint, Model, Program, Solution, Solver, Start
+from benchmarks.mpc.altered import Altered
+from ocp import OCP, Box, Constraint, Model, Solution
 from solvers import MultipleShooting
 
 LIMIT, FASTEST = 2.0, 1.5
@@ -33,36 +33,19 @@ Change = Callable[[Solution], Solution]
 
 
 @dataclass(frozen=True)
-class Scripted(Solver):
-    """A good solver whose answers are changed from time to time.
+class Script:
+    """What happens to answers from time to time: t0 [s], rounded to two digits -> a change."""
 
-    Args:
-        script: t0 [s], rounded to two digits -> what happens to the answer then; it may raise.
-    """
+    changes: Mapping[float, Change]
 
-    script: Mapping[float, Change] = field(default_factory=dict)
-    inner: Solver = field(default_factory=lambda: MultipleShooting(10))
-
-    def build(self, ocp: OCP) -> "ScriptedProgram":
-        return ScriptedProgram(self, self.inner.build(ocp))
-
-
-@dataclass(frozen=True, eq=False)
-class ScriptedProgram(Program):
-    solver: Scripted
-    inner: Program
-
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
-    ) -> Solution:
-        solution = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
-        change = self.solver.script.get(round(t0, 2))
+    def __call__(self, solution: Solution, t0: float) -> Solution:
+        change = self.changes.get(round(t0, 2))
         return change(solution) if change else solution
+
+
+def scripted(changes: Mapping[float, Change]) -> Altered:
+    """A good solver that does as the script says, raising included."""
+    return Altered(MultipleShooting(10), Script(changes))
 
 
 def is_an_input(u: np.ndarray) -> bool:

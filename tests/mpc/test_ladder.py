@@ -7,9 +7,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ocp import MPC, Applied, Box, ControlRefused, Outcome, Plant, ProblemError, Solution, Status
+from ocp import (
+    MPC,
+    Applied,
+    Box,
+    Constraint,
+    ControlRefused,
+    Outcome,
+    Plant,
+    ProblemError,
+    Solution,
+    Status,
+)
 from solvers import MultipleShooting
-from tests.mpc.problems import LIMIT, Change, Scripted, cart, is_an_input
+from tests.mpc.problems import FASTEST, LIMIT, Change, cart, is_an_input, scripted
 
 DT = 0.1
 
@@ -30,7 +41,7 @@ def leaves_bounds(by: float) -> Change:
 
 
 def controller(script: dict[float, Change] | None = None, **options) -> MPC:
-    return MPC(ocp=cart(), solver=Scripted(script or {}), dt=DT, **options)
+    return MPC(ocp=cart(), solver=scripted(script or {}), dt=DT, **options)
 
 
 def loop(mpc: MPC, duration: float = 1.0):
@@ -50,7 +61,7 @@ def test_without_faults_every_decision_is_optimal_and_the_cart_arrives() -> None
     [
         (raises(RuntimeError("as the script says")), "RuntimeError inside the solver"),
         (raises(ZeroDivisionError("as the script says")), "ZeroDivisionError inside the solver"),
-        (becomes(Status.INFEASIBLE), "INFEASIBLE"),
+        (becomes(Status.FAILED), "FAILED"),
         (becomes(Status.DIVERGED), "DIVERGED"),
         (leaves_bounds(1e-3), "control u"),
     ],
@@ -87,6 +98,39 @@ def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
     bad = loop(controller({0.3: too_fast}))
     assert bad.outcomes[3] is Outcome.SHIFTED
     assert "speed is violated" in bad.messages[3]
+
+
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+@pytest.mark.parametrize("as_bound", [True, False], ids=["bound", "constraint"])
+def test_noise_at_an_active_state_constraint_passes(as_bound: bool, backend) -> None:
+    """The measured speed is beyond its limit at some steps: nobody can change it any more."""
+    ocp = cart()
+    if as_bound:
+        limit = Box([-np.inf, -FASTEST], [np.inf, FASTEST])
+        ocp = replace(ocp, constraints=(), state_bounds=limit)
+    solver = MultipleShooting(10, backend=backend)
+    mpc = MPC(ocp=ocp, solver=solver, dt=DT, backup=lambda x, t: [0.0])
+    plant = Plant(ocp=ocp, measurement_noise=[0.0, 0.02])
+    rollout = mpc.run(plant, [4.0, 0.0], 3.0, seed=1).or_raise()
+    outside = np.abs(rollout.measured[:, 1]) > FASTEST + 1e-6
+    assert outside.sum() >= 5
+    for k, decision in enumerate(rollout.decisions):
+        assert decision.outcome is (Outcome.FEASIBLE if outside[k] else Outcome.OPTIMAL)
+        assert ("by the given start itself" in decision.message) == outside[k]
+        assert decision.age == 0, "every step has a plan of its own"
+    assert rollout.violation < 0.1
+
+
+def test_an_infeasible_plan_that_misses_its_end_is_not_followed() -> None:
+    """Along the way it meets everything; the end that it cannot reach is a constraint too."""
+    ocp = cart()
+    there = Constraint("there", ocp.model.x[0], -3.0, -2.9, at="terminal")
+    mpc = MPC(ocp=replace(ocp, constraints=(there,)), solver=MultipleShooting(10), dt=DT,
+              backup=lambda x, t: [0.0])  # fmt: skip
+    decision = mpc.step([1.0, 0.0], 0.0)
+    assert decision.status is Status.INFEASIBLE
+    assert decision.outcome is Outcome.BACKUP
+    assert "'there' is violated" in decision.message
 
 
 def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:
@@ -146,6 +190,19 @@ def test_late_answers_are_kept_for_later() -> None:
         slow.step([1.0, 0.0], 0.0)
 
 
+def test_a_late_plan_outlives_the_refusal_of_its_step() -> None:
+    mpc = controller()
+    with pytest.raises(ControlRefused, match="too late") as refused:
+        mpc.step([1.0, 0.0], 0.0, late=True)
+    attempt = refused.value.attempt
+    assert attempt is not None
+    assert attempt.late
+    assert attempt.status is Status.SOLVED
+    decision = mpc.step([np.nan, 0.0], DT)
+    assert decision.outcome is Outcome.SHIFTED, "the late plan is the last one"
+    assert decision.age == 1
+
+
 faults = st.sampled_from(
     [
         raises(RuntimeError("no")),
@@ -189,7 +246,7 @@ def test_whatever_fails_no_input_is_out_of_bounds(script, sensors) -> None:
 SCRIPT: dict[float, Change] = {}
 SHARED = MPC(
     ocp=cart(),
-    solver=Scripted(SCRIPT),
+    solver=scripted(SCRIPT),
     dt=DT,
     backup=lambda x, t: [-3.0 * x[0] - 3.0 * x[1]],
 )

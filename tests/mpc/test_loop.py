@@ -12,21 +12,25 @@ from ocp import (
     MPC,
     Applied,
     Box,
+    ControlRefused,
     FlightRecorder,
     Law,
     Outcome,
     Plant,
     ProblemError,
     Rollout,
+    Solution,
     SolverError,
+    Status,
     closed_loop,
     discretise,
     records,
     replay,
+    replay_all,
     solve,
 )
 from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
-from tests.mpc.problems import Scripted, cart
+from tests.mpc.problems import cart, scripted
 
 DT = 0.1
 START = [1.0, 0.0]
@@ -178,7 +182,7 @@ def unconstrained_named():
 
 def test_a_rollout_is_drawn(tmp_path: Path) -> None:
     script = {0.2: lambda s: s.with_(u=s.u + 9.0)}
-    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT)
+    mpc = MPC(ocp=cart(), solver=scripted(script), dt=DT)
     figure = mpc.run(Plant(ocp=cart()), START, 0.5).plot()
     assert "1 shifted" in figure.get_suptitle()
     figure.savefig(tmp_path / "loop.png")
@@ -187,7 +191,7 @@ def test_a_rollout_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize("delay", [0.0, DT])
 def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: float) -> None:
     script = {round(t + delay, 2): lambda s: s.with_(u=s.u + 9.0) for t in (0.2, 0.3)}
-    mpc = MPC(ocp=cart(), solver=Scripted(script), dt=DT, delay=delay, backup=lambda x, t: [-x[0]])
+    mpc = MPC(ocp=cart(), solver=scripted(script), dt=DT, delay=delay, backup=lambda x, t: [-x[0]])
     plant = Plant(ocp=cart(mass=1.2), measurement_noise=0.01)
     file = tmp_path / "flight"
     with FlightRecorder(mpc, file) as recorder:
@@ -200,6 +204,54 @@ def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: floa
         replay(mpc, file, 8)
     with pytest.raises(ProblemError, match="records the solver"):
         replay(driver(), file, 0)
+
+
+def test_a_refusal_is_recorded_and_refused_again(tmp_path: Path) -> None:
+    def fails(solution: Solution) -> Solution:
+        return solution.with_(status=Status.FAILED, message="as the script says")
+
+    mpc, file = MPC(ocp=cart(), solver=scripted({0.1: fails}), dt=DT), tmp_path / "flight"
+    with FlightRecorder(mpc, file) as recorder:
+        # A late plan outlives its own step, in the replay too: the third step follows it.
+        for k, (x, late) in enumerate([([1.0, 0.0], True), ([np.nan, 0.0], False), (START, True)]):
+            mpc_step(mpc, recorder, np.array(x), k * DT, late)
+    first, second, third = records(file)
+    assert (first.outcome, first.input, first.status) == (None, None, Status.SOLVED)
+    assert "too late for its step; there is no earlier plan" in first.message
+    assert first.plan is not None
+    assert (second.outcome, third.outcome) == (Outcome.SHIFTED, Outcome.SHIFTED)
+    assert [step.is_exact for step in replay_all(mpc, file, range(3))] == [True] * 3
+
+
+def mpc_step(mpc: MPC, recorder: FlightRecorder, x: np.ndarray, t: float, late: bool) -> None:
+    try:
+        recorder.watch(x, mpc.step(x, t, late=late))
+    except ControlRefused as refusal:
+        recorder.watch(x, refusal)
+
+
+def test_a_loop_records_the_refusal_that_ends_it(tmp_path: Path) -> None:
+    fails = {0.3: lambda s: s.with_(status=Status.FAILED, message="as the script says")}
+    mpc = MPC(ocp=cart(), solver=scripted(fails), dt=DT, backup=lambda x, t: [np.nan])
+    jumps = Plant(ocp=cart(), disturbance=lambda t: [80.0 if 0.2 <= t < 0.29 else 0.0])
+    with FlightRecorder(mpc, tmp_path / "flight") as recorder:
+        rollout = mpc.run(jumps, START, 1.0, watch=recorder.watch)
+    assert "FAILED" in rollout.ended
+    found = list(records(tmp_path / "flight"))
+    assert [r.outcome for r in found] == [Outcome.OPTIMAL] * 3 + [None]
+    assert found[3].message in rollout.ended
+    assert all(step.is_exact for step in replay_all(mpc, tmp_path / "flight", range(4)))
+    # Whoever has a backup law now does not refuse: that is no exact replay.
+    helped = replace(mpc, backup=lambda x, t: [0.0])
+    assert not replay(helped, tmp_path / "flight", 3).is_exact
+
+
+def test_a_law_that_refuses_is_no_flight(tmp_path: Path) -> None:
+    with (
+        FlightRecorder(driver(), tmp_path / "flight") as recorder,
+        pytest.raises(ProblemError, match="refusal of a controller that is no MPC"),
+    ):
+        recorder.watch(np.zeros(2), ControlRefused("the law said no"))
 
 
 def test_a_solver_that_remembers_replays_from_the_start(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def evaluated(tr: Transcription, w: np.ndarray, data: Data) -> tuple[float, np.n
 
 
 def data_of(ocp: OCP, t0: float = 0.0) -> Data:
-    return Data(ocp.start(), t0, ocp.parameter_values())
+    return Data.of(ocp, t0=t0)
 
 
 def test_every_row_is_the_one_it_says() -> None:

@@ -33,7 +33,7 @@ PROBLEMS = {
 def test_jacobian(name: str, segments: int) -> None:
     ocp: OCP = PROBLEMS[name]()
     extremals = Extremals.of(ocp, segments, 3, RK4())
-    data = Data(ocp.start(), 0.2, ocp.parameter_values())
+    data = Data.of(ocp, t0=0.2)
     schedule = Schedule.of(ocp, data, 3 * segments)
     rng = np.random.default_rng(1)
     shape = extremals.shape
@@ -69,7 +69,7 @@ def test_layout_of_the_unknowns() -> None:
 def test_segments_together_are_the_whole_horizon() -> None:
     """Started on one trajectory, many segments reproduce it and have no gaps."""
     ocp = van_der_pol()
-    data = Data(ocp.start(), 0.0, ocp.parameter_values())
+    data = Data.of(ocp, t0=0.0)
     one, four = Extremals.of(ocp, 1, 8, RK4()), Extremals.of(ocp, 4, 2, RK4())
     schedule = Schedule.of(ocp, data, 8)
     start = np.array([[1.0, 0.0, 1.7, 0.1]])

@@ -126,12 +126,33 @@ def test_infeasible_names_constraint_and_time(name: str, solver: Solver) -> None
     make, constraint, when = INFEASIBLE[name]
     solution = solve(make(), solver)
     assert solution.status is Status.INFEASIBLE
-    match = re.fullmatch(r"'(.*)' is violated by (\S+) at t = (\S+) s", solution.message)
+    match = re.fullmatch(
+        r"'(.*)' is violated by (\S+) at t = (\S+) s(, by the given start itself)?",
+        solution.message,
+    )
     assert match, solution.message
     assert re.fullmatch(constraint, match[1])
     assert float(match[2]) > 0.1
     assert float(match[3]) == pytest.approx(when, abs=0.051)
+    assert bool(match[4]) == name.startswith("x0 violates")
     stands_behind_nothing(solution)
+
+
+@direct
+def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(solver: Solver) -> None:
+    """A start that is given is no unknown: from the first step on the answer is an optimum."""
+    ocp = point(control_bounds=Box(-2.0, 2.0), state_bounds=Box(-0.2, 0.2))
+    program = solver.build(ocp)
+    outside = program.run(x0=[0.25])
+    assert outside.status is Status.INFEASIBLE
+    assert (
+        outside.message == "'bound of x' is violated by 0.05 at t = 0 s, by the given start itself"
+    )
+    assert ocp.state_bounds.excess(outside.x[1:]).max() < 1e-8
+    verdict = evaluate(outside)
+    assert verdict.violation == pytest.approx(0.05)
+    assert verdict.worst == "state x at t = 0 s"
+    assert program.run(x0=[0.2]).status is Status.SOLVED
 
 
 def test_more_terminal_equations_than_states() -> None:

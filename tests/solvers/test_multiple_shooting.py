@@ -41,7 +41,6 @@ from tests.solvers.problems import (
     changed,
     circle_start,
     ends,
-    moving,
     point,
     saturated_transfer,
     timed_transfer,
@@ -284,11 +283,6 @@ def test_any_number_of_intervals(intervals: int, make: Callable[[], OCP]) -> Non
         lambda: MultipleShooting(5).build(tracker()).run(parameters={"gain": np.nan}),
         lambda: solve(van_der_pol(), MultipleShooting(5), guess=Guess(u=[1.0, 2.0])),
         lambda: solve(van_der_pol(), MultipleShooting(5), guess=Guess(x=[np.nan, 0.0])),
-        lambda: (
-            MultipleShooting(5)
-            .build(changed(moving(lambda x, u: u, x0=0.5), state_bounds=Box(0, 1)))
-            .run(x0=2)
-        ),
     ],
 )
 def test_bad_options_and_data(make: Callable[[], object]) -> None:

@@ -111,7 +111,7 @@ def test_a_parameter_moves_the_end() -> None:
 def test_sensitivities_match_finite_differences() -> None:
     ocp = arm_scenario("arm-015").ocp("sum")
     reverse = Reverse.of(ocp, 60, RK4())
-    schedule = Schedule.of(ocp, Data(ocp.start(), 0.0, ocp.parameter_values()), 60)
+    schedule = Schedule.of(ocp, Data.of(ocp, t0=0.0), 60)
     end = np.array([0.9, -1.0, -1.2])
     exact = reverse.slope(reverse.path(end, schedule), schedule, np.eye(3))
     sides = [reverse.starts(end + s * STEP * np.eye(3), schedule) for s in (1.0, -1.0)]
@@ -123,7 +123,7 @@ def test_sensitivities_match_finite_differences() -> None:
 def test_many_ends_at_once_are_the_same_as_one() -> None:
     ocp = arm_scenario("arm-015").ocp("sum")
     reverse = Reverse.of(ocp, 40, RK4())
-    schedule = Schedule.of(ocp, Data(ocp.start(), 0.0, ocp.parameter_values()), 40)
+    schedule = Schedule.of(ocp, Data.of(ocp, t0=0.0), 40)
     ends = np.array([[0.9, -1.0, -1.2], [1.0, -0.8, -1.3]])
     many = reverse.starts(ends, schedule)
     for i, end in enumerate(ends):

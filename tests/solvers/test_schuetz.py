@@ -139,7 +139,7 @@ def test_discrete_gradient(integrator, make: Callable[[], OCP]) -> None:
     program = solver.build(ocp)
     h = ocp.duration / n
     u = 0.5 * np.random.default_rng(3).normal(size=(n, 1))
-    data = Data(ocp.start(), 0.0, ocp.parameter_values())
+    data = Data.of(ocp, t0=0.0)
     times, nodes = np.arange(n)[None, :] * h, np.linspace(0.0, 1.0, n + 1)
     left, right = data.values.on(nodes)
 

@@ -1,0 +1,45 @@
+"""A good solver whose answers are changed."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from ocp import OCP, Program, Solution, Solver, Start
+
+
+@dataclass(frozen=True)
+class Altered(Solver):
+    """A solver whose answers somebody changes, to see what becomes of it.
+
+    Args:
+        inner: the solver.
+        change: (answer, t0) -> what is returned instead; it may raise.
+    """
+
+    inner: Solver
+    change: Callable[[Solution, float], Solution]
+
+    def build(self, ocp: OCP) -> "AlteredProgram":
+        """Build the inner one."""
+        return AlteredProgram(self, self.inner.build(ocp))
+
+
+@dataclass(frozen=True, eq=False)
+class AlteredProgram(Program):
+    """The compiled form."""
+
+    solver: Altered
+    inner: Program
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve, and change the answer."""
+        answer = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        return self.solver.change(answer, t0)

@@ -1,0 +1,186 @@
+"""One step of a controller as bytes, and back."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from struct import Struct
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+
+from ocp.errors import ProblemError
+from ocp.mpc.decision import Attempt, Decision, Outcome
+from ocp.solution import ControlKind, Solution
+from ocp.status import Status
+
+_FORMAT = "flight record, version 2"
+# Bytes that follow; t, residual, clipped, time used; age; outcome, status, late, informed,
+# kind and status of the plan, number of arrays.
+_HEAD = Struct("<I4di7B")
+_SHAPE = Struct("<2i")
+# Instead of the number of columns: the array has one axis.
+_VECTOR = -1
+# A place in one of these is a byte of the head; the first entry of each: there is none.
+_OUTCOMES: tuple[Outcome | None, ...] = (None, *Outcome)
+_STATUSES: tuple[Status | None, ...] = (None, *Status)
+_KINDS: tuple[ControlKind | None, ...] = (None, "held", "linear", "extremal")
+_OUTCOME, _STATUS, _KIND = (
+    {entry: place for place, entry in enumerate(entries)}
+    for entries in (_OUTCOMES, _STATUSES, _KINDS)
+)
+
+
+class Plan(NamedTuple):
+    """A plan without its problem; see ``Solution``."""
+
+    kind: ControlKind
+    status: Status
+    t: np.ndarray
+    x: np.ndarray
+    x0: np.ndarray
+    costate: np.ndarray
+    u: np.ndarray
+
+
+class Record(NamedTuple):
+    """One step from the file; see ``Decision``.
+
+    Attributes:
+        t: when the state was measured [s].
+        outcome: which rung the input came from; None where the step was refused.
+        status: how the solver ended.
+        message: why the outcome is not ``OPTIMAL``.
+        measured: what the controller was told (nx,).
+        input: what was sent (m,); None where the step was refused.
+        parameters: as they were known.
+        plan: that was found good at this step, if there is one.
+        late: whether the answer of the solver came too late.
+        is_informed: whether the parameters were known.
+        residual: of the solver.
+        clipped: by how much the input was clipped.
+        age: of the plan that was followed, in steps.
+        time_used: [s].
+    """
+
+    t: float
+    outcome: Outcome | None
+    status: Status | None
+    message: str
+    measured: np.ndarray
+    input: np.ndarray | None
+    parameters: Mapping[str, np.ndarray]
+    plan: Plan | None
+    late: bool
+    is_informed: bool
+    residual: float
+    clipped: float
+    age: int
+    time_used: float
+
+
+def header(problem: str, solver: str, parameters: Sequence[str]) -> bytes:
+    """Return the first line of a file: whose it is."""
+    said = {"format": _FORMAT, "problem": problem, "solver": solver, "parameters": [*parameters]}
+    return json.dumps(said).encode() + b"\n"
+
+
+def packed(measured: np.ndarray, step: Attempt, plan: Solution | None) -> bytes:
+    """Return a step, its measurement and the plan that was found good at it as bytes."""
+    decision = step if isinstance(step, Decision) else None
+    arrays = [measured]
+    if decision:
+        arrays.append(decision.input)
+    if plan:
+        arrays += (plan.t, plan.x, plan.x0, plan.costate, plan.u)
+    arrays += step.parameters.values()
+    arrays = [np.asarray(array, dtype=float) for array in arrays]
+    pieces = [_SHAPE.pack(*array.shape, *(_VECTOR,) * (2 - array.ndim)) for array in arrays]
+    pieces += [array.tobytes() for array in arrays]
+    pieces.append(step.message.encode())
+    body = b"".join(pieces)
+    head = _HEAD.pack(
+        len(body),
+        step.t,
+        step.residual,
+        decision.clipped if decision else 0.0,
+        step.time_used,
+        decision.age if decision else 0,
+        _OUTCOME[decision.outcome if decision else None],
+        _STATUS[step.status],
+        step.late,
+        step.is_informed,
+        _KIND[plan.control_kind if plan else None],
+        _STATUS[plan.status if plan else None],
+        len(arrays),
+    )
+    return head + body
+
+
+def read_header(file: BinaryIO, path: str | Path) -> dict[str, str | list[str]]:
+    """Return what the first line says.
+
+    Raises:
+        ProblemError: if it is none of a flight record.
+    """
+    try:
+        said = json.loads(file.readline())
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ProblemError(f"{path} is no flight record") from error
+    if not isinstance(said, dict) or said.get("format") != _FORMAT:
+        raise ProblemError(f"{path} is no {_FORMAT}")
+    return said
+
+
+def records(path: str | Path) -> Iterator[Record]:
+    """Yield the complete records of a file, in order.
+
+    Raises:
+        ProblemError: if it is no flight record.
+    """
+    with Path(path).open("rb") as file:
+        names = read_header(file, path)["parameters"]
+        while (head := file.read(_HEAD.size)) and len(head) == _HEAD.size:
+            body = file.read(_HEAD.unpack(head)[0])
+            if len(body) < _HEAD.unpack(head)[0]:
+                return
+            yield _unpacked(head, body, names)
+
+
+def _unpacked(head: bytes, body: bytes, names: Sequence[str]) -> Record:
+    (_, t, residual, clipped, time_used, age, outcome, status, late, informed, kind, made, count
+     ) = _HEAD.unpack(head)  # fmt: skip
+    arrays, end = _arrays(body, count)
+    rest = iter(arrays)
+    measured = next(rest)
+    sent = next(rest) if outcome else None
+    plan = None
+    if kind:
+        five = [next(rest) for _ in range(5)]
+        plan = Plan(_KINDS[kind], _STATUSES[made], *five)  # pyright: ignore[reportArgumentType]
+    return Record(
+        t=t,
+        outcome=_OUTCOMES[outcome],
+        status=_STATUSES[status],
+        message=body[end:].decode(),
+        measured=measured,
+        input=sent,
+        parameters=dict(zip(names, rest, strict=bool(informed))),
+        plan=plan,
+        late=bool(late),
+        is_informed=bool(informed),
+        residual=residual,
+        clipped=clipped,
+        age=age,
+        time_used=time_used,
+    )
+
+
+def _arrays(body: bytes, count: int) -> tuple[list[np.ndarray], int]:
+    """Return the arrays at the beginning, and where they end."""
+    at, found = count * _SHAPE.size, []
+    for rows, columns in _SHAPE.iter_unpack(body[:at]):
+        shape = (rows,) if columns == _VECTOR else (rows, columns)
+        size = int(np.prod(shape))
+        found.append(np.frombuffer(body, count=size, offset=at).reshape(shape))
+        at += 8 * size
+    return found, at
