@@ -64,6 +64,7 @@ class Conversation:
         ]
         for reader in self._readers:
             reader.start()
+        self._writer = self._readers[0]
 
     def ask(self, request: dict[str, Any], limit: float) -> dict[str, Any]:
         """Send a request and return the answer.
@@ -75,8 +76,9 @@ class Conversation:
         Raises:
             PeerFailed: if there is no answer, or none that is a JSON object.
         """
-        with suppress(BrokenPipeError):  # it has ended, and the empty answer below says so
-            self._write(json.dumps(request))
+        # In a thread: a peer that does not listen would let us wait here without a limit.
+        self._writer = Thread(target=self._write, args=(json.dumps(request),), daemon=True)
+        self._writer.start()
         try:
             line = self._answers.get(timeout=limit)
         except Empty:
@@ -95,18 +97,17 @@ class Conversation:
         if not self._is_open:
             return
         self._is_open = False
-        with suppress(BrokenPipeError, ValueError):
-            self._pipe("stdin").close()
         with suppress(ProcessLookupError, PermissionError):
             if hasattr(os, "killpg"):
                 os.killpg(self._process.pid, signal.SIGKILL)
             else:
                 self._process.kill()
         self._process.wait()
-        for reader in self._readers:
-            reader.join(timeout=1.0)
-        for name in ("stdout", "stderr"):
-            self._pipe(name).close()
+        for thread in (self._writer, *self._readers):
+            thread.join(timeout=1.0)
+        for name in ("stdin", "stdout", "stderr"):
+            with suppress(BrokenPipeError):
+                self._pipe(name).close()
         self._folder.cleanup()
 
     def __enter__(self) -> "Conversation":
@@ -125,8 +126,9 @@ class Conversation:
 
     def _write(self, line: str) -> None:
         pipe = self._pipe("stdin")
-        pipe.write(line + "\n")
-        pipe.flush()
+        with suppress(BrokenPipeError):  # it has ended, and its empty answer says so
+            pipe.write(line + "\n")
+            pipe.flush()
 
     def _listen(self) -> None:
         for line in self._pipe("stdout"):

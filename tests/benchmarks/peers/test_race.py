@@ -9,6 +9,7 @@ import pytest
 from benchmarks.peers import Environment, Peer
 from benchmarks.peers import contender as contenders
 from benchmarks.peers.contender import OwnContender, PeerContender
+from benchmarks.peers.conversation import Conversation, PeerFailed
 from benchmarks.peers.job import Job, Situation
 from benchmarks.peers.race import race
 from models import double_integrator_energy
@@ -76,6 +77,13 @@ def test_one_that_fails_costs_its_row_only(job, peer, monkeypatch):
     assert said["fake, cannot"] == "not my kind of problem"
     assert said["fake, nan"].startswith("its answer is not finite")
     assert "'u'" in said["fake, poor"]
+
+
+def test_one_that_does_not_listen_is_stopped_too(tmp_path):
+    (tmp_path / "deaf.py").write_text("import time; time.sleep(60)", encoding="utf-8")
+    command = [sys.executable, str(tmp_path / "deaf.py")]
+    with Conversation(command) as deaf, pytest.raises(PeerFailed, match="hung: no answer to 'x'"):
+        deaf.ask({"do": "x", "much": "more than a pipe holds" * 100_000}, limit=0.5)
 
 
 def test_one_that_cannot_be_started_is_a_row_too(job, peer, monkeypatch):
