@@ -52,24 +52,17 @@ def compare(
 
 
 def _merged(entries: Sequence[Entry]) -> list[Entry]:
-    """Say once what all settings of a peer have in common: not installed, or no problem for it."""
+    """Say once what no setting of a peer can do."""
     kept: list[Entry] = []
     for entry in entries:
-        whole = replace(entry, contender=entry.contender.split(",")[0])
-        same = entry.outcome in ("cannot treat it", "not installed")
-        if not same:
+        name = entry.contender.split(",")[0]
+        settings = [other for other in entries if other.contender.split(",")[0] == name]
+        common = {(other.outcome, other.remark) for other in settings}
+        if len(common) > 1 or entry.outcome != "cannot treat it":
             kept.append(entry)
-        elif not any(_same(whole, other) for other in kept):
-            kept.append(whole)
+        elif entry is settings[0]:
+            kept.append(replace(entry, contender=name))
     return kept
-
-
-def _same(one: Entry, other: Entry) -> bool:
-    return (one.contender, one.outcome, one.remark) == (
-        other.contender,
-        other.outcome,
-        other.remark,
-    )
 
 
 def _load() -> float:

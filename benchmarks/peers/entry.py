@@ -25,7 +25,8 @@ class Entry:
         status: of the last solve, in the contender's own words.
         solves: how many solves count: those of a job with steps without the cold one.
         good: how many of them the referee found feasible.
-        cost: sum of the referee's costs of these solves; None if a state blows up.
+        cost: sum of the referee's costs of these solves; None if a state blows up, or where ours
+            has no such solves.
         gap: relative to the sum of the first of our solvers over the same solves.
         violation: largest one the referee found, in the problem's units.
         build: time to build it [s].

@@ -119,9 +119,9 @@ def _measured(
     against: dict[int, float],
     own: list[_Runner],
 ) -> Entry:
-    asked = max(1, len(job.situations) - 1)
+    asked = len(job.situations) - 1
     remarks = [runner.contender.remark] if runner.contender.remark else []
-    if runner.warm and len(runner.warm) < asked:
+    if len(runner.warm) < asked:
         remarks.append(f"too slow: stopped after {len(runner.warm)} of {asked} steps")
     common = costs.keys() & against.keys()
     ours, theirs = (sum(c[k] for k in common) for c in (against, costs))
@@ -136,7 +136,7 @@ def _measured(
         status=list(runner.judged.values())[-1].status,
         solves=len(costs),
         good=sum(v <= FEASIBLE for v in violations),
-        cost=_finite(sum(costs.values())),
+        cost=_finite(sum(costs.values())) if common else None,
         gap=_finite((theirs - ours) / abs(ours)) if common and ours else None,
         violation=_finite(violation),
         build=runner.build,

@@ -21,6 +21,15 @@ for _name in ("blasfeo", "hpipm", "qpOASES_e"):
 from acados.acados_template import AcadosModel, AcadosOcp, AcadosOcpSolver  # noqa: E402
 
 _ITERATIONS = 200
+# Real-time iteration presumes that it once was at a solution: so often it iterates at first.
+_FIRST = 20
+_WORDS = {
+    0: "solved",
+    1: "failed: NaN",
+    2: "failed: iteration limit",
+    3: "failed: smallest step",
+    4: "failed: its QP has no solution",
+}
 
 
 class Acados:
@@ -33,7 +42,8 @@ class Acados:
             "casadi": casadi.__version__,
             "numpy": np.__version__,
         }
-        self.remark = "one iteration a step, also the cold one" if job["setting"] == "RTI" else ""
+        self._first = _FIRST if job["setting"].startswith("RTI") else 1
+        self.remark = f"one iteration a step, {_FIRST} cold" if self._first > 1 else ""
         self._job = job
         self._solver = AcadosOcpSolver(_stated(job), json_file="job.json")
 
@@ -50,14 +60,15 @@ class Acados:
             solver.set(k, "p", p[k])
         solver.set(0, "lbx", x0)
         solver.set(0, "ubx", x0)
-        self._status = solver.solve()
+        for _ in range(self._first if guess is not None else 1):
+            self._status = solver.solve()
         solver.get(0, "u")
 
     def plan(self) -> dict:
         """Return the last answer."""
         solver, n = self._solver, self._job["N"]
         iterations = int(np.sum(solver.get_stats("sqp_iter")))
-        word = f"{'solved' if self._status == 0 else f'failed: status {self._status}'}"
+        word = _WORDS.get(self._status, f"failed: status {self._status}")
         return {
             "x": [solver.get(k, "x") for k in range(n + 1)],
             "u": [solver.get(k, "u") for k in range(n)],
@@ -81,7 +92,7 @@ def _stated(job: dict) -> AcadosOcp:
     options = ocp.solver_options
     options.tf = job["N"] * job["interval"]
     options.integrator_type = "DISCRETE"
-    options.nlp_solver_type = "SQP_RTI" if job["setting"] == "RTI" else "SQP"
+    options.nlp_solver_type = "SQP_RTI" if job["setting"].startswith("RTI") else "SQP"
     # With an external cost, Gauss-Newton leaves out the curvature of the dynamics only.
     no_curvature = job["setting"].endswith("Gauss-Newton")
     options.hessian_approx = "GAUSS_NEWTON" if no_curvature else "EXACT"
