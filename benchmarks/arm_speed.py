@@ -4,7 +4,7 @@ Times are processor times of this process; all contenders decide for the same me
 turns, so that ratios of one run mean something where the times do not.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import process_time
 
@@ -12,10 +12,10 @@ import numpy as np
 
 from models import random_scenarios
 from ocp import MPC, OCP, Applied, Outcome, Solver, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz
+from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
 INTERVALS = (10, 20, 35, 50, 100, 200)
-LINKS = (3, 4, 6)
+LINKS = (3, 4, 6, 8, 10)
 # The problem whose ratios are asked for: 35 intervals of 20 ms.
 N, DT, HORIZON = 35, 0.02, 0.7
 # Rate at which an error of the end effector decays (3.18) [1/s].
@@ -63,12 +63,21 @@ def contenders(intervals: int = N) -> dict[str, Solver]:
     return {
         "direct, ipopt": MultipleShooting(intervals),
         "direct, fatrop": MultipleShooting(intervals, backend="fatrop"),
+        "stagewise Newton": StagewiseNewton(intervals),
         "indirect": IndirectShooting(segments=5, steps=intervals),
         "gradient": Schuetz.sound(intervals=intervals),
     }
 
 
-def arm_steps(solvers: Mapping[str, Solver], ocp: OCP, count: int) -> list[Steps]:
+def stagewise() -> dict[str, Solver]:
+    """Return the solvers whose compiled stages are compared over the links."""
+    names = ("direct, fatrop", "stagewise Newton")
+    return {name: solver for name, solver in contenders().items() if name in names}
+
+
+def arm_steps(
+    solvers: Mapping[str, Solver], ocp: OCP, count: int, stages: Sequence[bool] = (False, True)
+) -> list[Steps]:
     """Let every solver, interpreted and compiled, decide ``count`` steps of one motion in turns.
 
     The motion is that of the first contender; everybody sees it with the same noise.
@@ -79,7 +88,7 @@ def arm_steps(solvers: Mapping[str, Solver], ocp: OCP, count: int) -> list[Steps
             ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"), guess=guess, compiled=compiled
         )
         for name, solver in solvers.items()
-        for compiled in (False, True)
+        for compiled in stages
     }
     times: dict[tuple[str, bool], list[float]] = {key: [] for key in racing}
     planned = dict.fromkeys(racing, 0)

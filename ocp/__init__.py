@@ -3,6 +3,7 @@
 from ocp.buffered import Buffered
 from ocp.compile import Compiler, InterpretedWarning, compiled
 from ocp.constraint import Box, Constraint
+from ocp.curvature import curvature
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.expressions import instance, numbers, whole
@@ -91,6 +92,7 @@ __all__ = [
     "closed_loop",
     "compiled",
     "costates_along",
+    "curvature",
     "derive",
     "discretise",
     "evaluate",

@@ -38,9 +38,18 @@ class Integrator(ABC):
             z = self.substep(rate, z, s + i * substep, substep)
         return z
 
+    @property
     @abstractmethod
+    def slopes(self) -> tuple[tuple[float, float], ...]:
+        """Reach and weight of every slope: k_i is taken at z + reach h k_{i-1}, s + reach h."""
+
     def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
-        """Return z after one substep."""
+        """Return z + h (sum of weight times slope) after one substep."""
+        slope, moved = z, z
+        for i, (reach, weight) in enumerate(self.slopes):
+            slope = rate(z + reach * h * slope if i else z, s + reach * h)
+            moved = moved + weight * h * slope
+        return moved
 
 
 @dataclass(frozen=True)
@@ -49,9 +58,10 @@ class Euler(Integrator):
 
     order: ClassVar[int] = 1
 
-    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
-        """Return z + h rate(z, s)."""
-        return z + h * rate(z, s)
+    @property
+    def slopes(self) -> tuple[tuple[float, float], ...]:
+        """One slope, at the start."""
+        return ((0.0, 1.0),)
 
 
 @dataclass(frozen=True)
@@ -60,9 +70,10 @@ class Midpoint(Integrator):
 
     order: ClassVar[int] = 2
 
-    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
-        """Return z + h rate at the middle."""
-        return z + h * rate(z + h / 2 * rate(z, s), s + h / 2)
+    @property
+    def slopes(self) -> tuple[tuple[float, float], ...]:
+        """The slope in the middle."""
+        return (0.0, 0.0), (0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -71,13 +82,10 @@ class RK4(Integrator):
 
     order: ClassVar[int] = 4
 
-    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
-        """Return z after one step with the weights 1/6, 1/3, 1/3, 1/6."""
-        k1 = rate(z, s)
-        k2 = rate(z + h / 2 * k1, s + h / 2)
-        k3 = rate(z + h / 2 * k2, s + h / 2)
-        k4 = rate(z + h * k3, s + h)
-        return z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    @property
+    def slopes(self) -> tuple[tuple[float, float], ...]:
+        """Weights 1/6, 1/3, 1/3, 1/6."""
+        return (0.0, 1 / 6), (0.5, 1 / 3), (0.5, 1 / 3), (1.0, 1 / 6)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
 from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.direct.stagewise_newton import StagewiseNewton
 from solvers.gradient.line_search import Armijo, FixedStep, StepRule
 from solvers.gradient.schuetz import Schuetz
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
@@ -69,6 +70,7 @@ __all__ = [
     "Schuetz",
     "SecondOrder",
     "SelfMotion",
+    "StagewiseNewton",
     "StepRule",
     "Table",
     "Task",

@@ -17,7 +17,14 @@ import numpy as np
 from benchmarks.tuned_kinematics import instantaneous, tuned_kinematics
 from models import ArmScenario, DistanceCost, Path, redundancy_ocp
 from ocp import MPC, OCP, Applied, Box, Law, Plant, Rollout, Solution, Solver, closed_loop, solve
-from solvers import FixedStep, IndirectShooting, MultipleShooting, Repulsion, Schuetz
+from solvers import (
+    FixedStep,
+    IndirectShooting,
+    MultipleShooting,
+    Repulsion,
+    Schuetz,
+    StagewiseNewton,
+)
 
 DT = 0.02  # [s]
 CORRECTION = 10.0  # K of (3.18) [1/s]
@@ -29,6 +36,7 @@ Make = Callable[[int], Solver]
 # Intervals -> solver. The step length 0.01 is that of the thesis' table in 3.2.6.
 SOLVERS: dict[str, Make] = {
     "direct": lambda n: MultipleShooting(n, backend="fatrop"),
+    "newton": lambda n: StagewiseNewton(n),
     "shooting": lambda n: IndirectShooting(steps=n, tolerance=1e-8),
     "schuetz": lambda n: Schuetz(intervals=n, step=FixedStep(0.01)),
     "schuetz-sound": lambda n: Schuetz.sound(intervals=n),

@@ -1,7 +1,7 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
 from typing import Literal
@@ -13,7 +13,6 @@ from ocp import (
     OCP,
     RK4,
     Box,
-    Buffered,
     Data,
     Integrator,
     ProblemError,
@@ -21,17 +20,16 @@ from ocp import (
     Row,
     Solution,
     Solver,
-    Stage,
     Start,
     Status,
     Transcription,
     Work,
-    compiled,
     instance,
     whole,
 )
 from solvers.direct.backend import Answer, Backend, Nlp
 from solvers.direct.feasibility import Feasibility
+from solvers.direct.intervals import Intervals
 
 # Beyond this a constraint counts as violated, whatever the backend says about scaled ones.
 _VIOLATED = 1e-6
@@ -88,11 +86,8 @@ class MultipleShooting(Solver):
         """Transcribe the problem and set the backend up."""
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         nlp = self.options.build(transcription)
-        n, finer = transcription.n, replace(self.integrator, steps=2 * self.integrator.steps)
-        halved = Stage.of(ocp, finer, held=True).step
-        check = Buffered((compiled(halved) if self.compiled else halved).map(n))
-        rollout = Buffered(transcription.step.mapaccum(n))
-        return MultipleShootingProgram(self, transcription, nlp, rollout, check)
+        intervals = Intervals.of(ocp, transcription.n, self.integrator, fast=self.compiled)
+        return MultipleShootingProgram(self, transcription, nlp, intervals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,15 +98,13 @@ class MultipleShootingProgram(Program):
         solver: the options.
         transcription: the problem on its grid.
         nlp: the backend.
-        rollout: all intervals in a row, for first guesses.
-        check: every interval on its own, with half the step.
+        intervals: for first guesses, and to check the integrator.
     """
 
     solver: MultipleShooting
     transcription: Transcription
     nlp: Nlp
-    rollout: Buffered
-    check: Buffered
+    intervals: Intervals
 
     def run(
         self,
@@ -164,27 +157,12 @@ class MultipleShootingProgram(Program):
     # -- the first iterate -------------------------------------------------------------------
 
     def _first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
-        """States and controls of the guess; without states, the controls' own roll-out."""
-        tr = self.transcription
-        ocp, m, nodes = tr.ocp, tr.ocp.model, tr.fractions
-        x = guess.sample("x", nodes, m.nx) if guess else None
-        u = guess.sample("u", nodes[:-1], m.nu) if guess else None
+        """States and controls of the guess, a free final time with the states."""
+        tr, ocp = self.transcription, self.transcription.ocp
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
-        u = ocp.control_bounds.clip(np.zeros((tr.n, m.nu)) if u is None else u)
-        if x is None:
-            x, _ = self.rollout(data.x0, u.T, *self._schedule(data, duration))
-            x = np.vstack([data.x0, x.T])
-        if not np.isfinite(x).all():
-            x = np.tile(data.x0, (tr.n + 1, 1))
+        x, u = self.intervals.first_iterate(data, guess, duration)
         z = np.hstack([x, np.full((tr.n + 1, 1), duration)]) if ocp.has_free_time else x
         return z, u
-
-    def _schedule(self, data: Data, duration: float) -> list[np.ndarray]:
-        """Times, steps and parameters of every interval."""
-        nodes, n = self.transcription.fractions, self.transcription.n
-        left, right = data.values.on(nodes)
-        t = data.t0 + nodes[None, :-1] * duration
-        return [t, np.full((1, n), duration / n), left.T, right.T]
 
     # -- the verdict -------------------------------------------------------------------------
 
@@ -233,15 +211,9 @@ class MultipleShootingProgram(Program):
 
     def _integration_error(self, answer: Answer, data: Data) -> tuple[float, int]:
         """By how much half the step moves the end of an interval, relative to 1 + abs(x)."""
-        tr = self.transcription
-        if tr.ocp.model.is_discrete:
-            return 0.0, 0
-        z, u = tr.split(answer.w)
-        x = z[:, : tr.ocp.model.nx]
-        after, _ = self.check(x[:-1].T, u.T, *self._schedule(data, self._duration(answer)))
-        moved = np.abs(after.T - x[1:]) / (1.0 + np.abs(x[1:]))
-        worst = int(moved.max(axis=1).argmax())
-        return float(moved[worst].max()), worst + 1
+        z, u = self.transcription.split(answer.w)
+        x = z[:, : self.transcription.ocp.model.nx]
+        return self.intervals.error(x, u, self.intervals.schedule(data, self._duration(answer)))
 
     def _where(self, answer: Answer, data: Data, violation: float, row: Row | None) -> str:
         if row is None:

@@ -29,7 +29,15 @@ from ocp import (
     replay_all,
     solve,
 )
-from solvers import Greedy, IndirectShooting, LinearMPC, MultipleShooting, Riccati, Schuetz
+from solvers import (
+    Greedy,
+    IndirectShooting,
+    LinearMPC,
+    MultipleShooting,
+    Riccati,
+    Schuetz,
+    StagewiseNewton,
+)
 from tests.mpc.problems import cart, scripted
 
 DT = 0.1
@@ -45,7 +53,13 @@ def driver(**options) -> MPC:
 
 @pytest.mark.parametrize(
     "solver",
-    [MultipleShooting(20), Schuetz.sound(intervals=20), IndirectShooting(), Greedy(intervals=20)],
+    [
+        MultipleShooting(20),
+        StagewiseNewton(20),
+        Schuetz.sound(intervals=20),
+        IndirectShooting(),
+        Greedy(intervals=20),
+    ],
     ids=lambda solver: type(solver).__name__,
 )
 def test_continuous_solvers_run_in_the_loop(solver) -> None:
@@ -59,7 +73,9 @@ def test_continuous_solvers_run_in_the_loop(solver) -> None:
 
 
 @pytest.mark.parametrize(
-    "solver", [LinearMPC(), LinearMPC(form="condensed"), Riccati(), MultipleShooting()], ids=repr
+    "solver",
+    [LinearMPC(), LinearMPC(form="condensed"), Riccati(), MultipleShooting(), StagewiseNewton()],
+    ids=repr,
 )
 def test_linear_solvers_run_in_the_loop(solver) -> None:
     ocp = discretise(unconstrained(), dt=0.05)

@@ -18,7 +18,7 @@ from ocp import (
     Model,
     Transcription,
 )
-from solvers import IndirectShooting, MultipleShooting, Schuetz
+from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 from tests.mpc.problems import cart
 
 # Iterations stop at their own tolerance; between two runs only rounding differs.
@@ -55,6 +55,7 @@ def quickest() -> OCP:
 SOLVERS = [
     MultipleShooting(10),
     MultipleShooting(10, backend="fatrop"),
+    StagewiseNewton(10),
     IndirectShooting(segments=2, steps=20),
     Schuetz(10, gradient="continuous"),
     Schuetz.sound(intervals=10),
@@ -62,7 +63,9 @@ SOLVERS = [
 
 
 @needs_compiler
-@pytest.mark.parametrize("solver", SOLVERS, ids=["ipopt", "fatrop", "indirect", "thesis", "sound"])
+@pytest.mark.parametrize(
+    "solver", SOLVERS, ids=["ipopt", "fatrop", "newton", "indirect", "thesis", "sound"]
+)
 def test_the_same_answer(solver):
     ocp = swing()
     slow = solver.build(ocp).run()

@@ -29,12 +29,14 @@ from solvers import (
     IndirectShooting,
     MultipleShooting,
     Schuetz,
+    StagewiseNewton,
 )
 from tests.solvers.problems import changed, ends, moving, point
 
 DIRECT = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
 ALL = (
     *DIRECT,
+    StagewiseNewton(20),
     IndirectShooting(),
     IndirectShooting(damped=False),
     IndirectShooting(segments=5, steps=50, jacobian="finite-difference"),

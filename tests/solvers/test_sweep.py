@@ -6,13 +6,14 @@ import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, Family, arm_cases
 from ocp import Solution, Solver, Status, evaluate, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz, polish
+from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton, polish
 from tests.tolerances import BELOW, GAP, VIOLATION
 
 SOLVERS: tuple[tuple[Family, Solver], ...] = (
     ("direct", MultipleShooting()),
     ("direct", MultipleShooting(backend="fatrop")),
     ("gradient", Schuetz.sound()),
+    ("gradient", StagewiseNewton()),
     ("indirect", IndirectShooting(segments=1)),
     ("indirect", IndirectShooting(segments=15)),
 )
