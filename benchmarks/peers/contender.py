@@ -15,7 +15,7 @@ from benchmarks.peers.export import exported
 from benchmarks.peers.job import Job, Situation
 from benchmarks.peers.peer import Peer
 from benchmarks.row import versions
-from ocp import Guess, Program, Solution, Solver, Status
+from ocp import Guess, Program, Solution, Solver, Status, UnsupportedProblem
 
 # Time for an answer [s]: to build a job, which may compile, and to solve it once.
 BUILD_LIMIT, SOLVE_LIMIT = 300.0, 60.0
@@ -122,7 +122,10 @@ class OwnContender(Contender):
     def build(self, job: Job) -> float:
         """Build its program."""
         began = perf_counter()
-        self._program: Program = self._solver.build(job.ocp)
+        try:
+            self._program: Program = self._solver.build(job.ocp)
+        except UnsupportedProblem as reason:
+            raise CannotTreat(str(reason)) from reason
         self._guess = Guess(x=job.guess["x"], u=job.guess["u"])
         self._last: Solution | None = None
         return perf_counter() - began

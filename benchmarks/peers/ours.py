@@ -4,7 +4,7 @@ from typing import Literal
 
 from benchmarks.peers.contender import OwnContender
 from benchmarks.peers.job import Job
-from solvers import LinearMPC, MultipleShooting
+from solvers import LinearMPC, MultipleShooting, StagewiseNewton
 
 
 def own_contenders(job: Job) -> list[OwnContender]:
@@ -15,6 +15,7 @@ def own_contenders(job: Job) -> list[OwnContender]:
             for backend, form in _LINEAR
         ]
     n, tolerance = job.intervals, job.tolerance
+    newton = StagewiseNewton(n, tolerance=tolerance, compiled=True)
     return [
         OwnContender(
             f"MultipleShooting, {backend}",
@@ -22,7 +23,7 @@ def own_contenders(job: Job) -> list[OwnContender]:
             "stages compiled",
         )
         for backend in ("ipopt", "fatrop")
-    ]
+    ] + [OwnContender("StagewiseNewton", newton, "stages and recursion compiled")]
 
 
 _LINEAR: tuple[tuple[str, Literal["sparse", "condensed"]], ...] = (

@@ -65,7 +65,7 @@ PEERS: tuple[Peer, ...] = (
         "SQP with HPIPM, generated C; full steps to convergence, or real-time iteration",
         "acados_sqp.py",
         "acados.txt",
-        ("SQP", "SQP, Gauss-Newton", "RTI", "RTI, Gauss-Newton"),
+        ("SQP", "SQP, Gauss-Newton", "RTI"),
     ),
     Peer("rockit", "direct multiple shooting, IPOPT", "rockit_direct.py", "rockit.txt"),
     Peer(

@@ -42,8 +42,10 @@ class Acados:
             "casadi": casadi.__version__,
             "numpy": np.__version__,
         }
-        self._first = _FIRST if job["setting"].startswith("RTI") else 1
-        self.remark = f"one iteration a step, {_FIRST} cold" if self._first > 1 else ""
+        self._first = _FIRST if job["setting"] == "RTI" else 1
+        self.remark = (
+            f"Gauss-Newton, one iteration a step, {_FIRST} cold" if self._first > 1 else ""
+        )
         self._job = job
         self._solver = AcadosOcpSolver(_stated(job), json_file="job.json")
 
@@ -92,9 +94,9 @@ def _stated(job: dict) -> AcadosOcp:
     options = ocp.solver_options
     options.tf = job["N"] * job["interval"]
     options.integrator_type = "DISCRETE"
-    options.nlp_solver_type = "SQP_RTI" if job["setting"].startswith("RTI") else "SQP"
+    options.nlp_solver_type = "SQP_RTI" if job["setting"] == "RTI" else "SQP"
     # With an external cost, Gauss-Newton leaves out the curvature of the dynamics only.
-    no_curvature = job["setting"].endswith("Gauss-Newton")
+    no_curvature = job["setting"] != "SQP"
     options.hessian_approx = "GAUSS_NEWTON" if no_curvature else "EXACT"
     options.regularize_method = "PROJECT"
     options.qp_solver = "PARTIAL_CONDENSING_HPIPM"
