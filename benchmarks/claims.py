@@ -5,31 +5,34 @@ from statistics import median
 
 from benchmarks.claim import Claim
 from benchmarks.clearance_claims import clearance_claims
+from benchmarks.library_claims import library_claims
 from benchmarks.row import Row
 
 # A trajectory that violates a constraint by more may gain by it.
 FEASIBLE = 1e-6
-# A referee's cost this far below a reference, relative: the reference is wrong.
+# What a violation that still counts as none may gain, relative to the reference: a cost further
+# below the reference's lower end disproves it.
 BELOW_REFERENCE = 1e-6
 
 
 def below_reference(rows: Iterable[Row]) -> tuple[Row, ...]:
-    """Return the rows that cost less than the best known, whatever their status.
+    """Return the rows that cost less than the lower end of a reference, whatever their status.
 
     Each disproves its reference.
     """
     return tuple(
         row
         for row in rows
-        if row.gap is not None
-        and row.gap < -BELOW_REFERENCE
+        if row.cost is not None
+        and row.lower is not None
+        and row.cost < row.lower - BELOW_REFERENCE * abs(row.lower)
         and row.violation is not None
         and row.violation <= FEASIBLE
     )
 
 
 def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
-    """Return the claims on the suites ``arm`` and ``clearance`` that these rows can decide."""
+    """Return the claims on the suites ``arm``, ``clearance`` and ``library``, as far as decided."""
     every = {name: _of(rows, name) for name in dict.fromkeys(row.solver for row in rows)}
     found = [
         _gap_claim(every.get("direct-75", ())),
@@ -39,7 +42,8 @@ def claims_of(rows: Sequence[Row]) -> tuple[Claim, ...]:
         _basin_claim(every.get("schuetz-sound", ())),
         _multiple_claim(every.get("indirect-15", ())),
     ]
-    return (*(claim for claim in found if claim is not None), *clearance_claims(rows))
+    decided = (claim for claim in found if claim is not None)
+    return (*decided, *clearance_claims(rows), *library_claims(rows))
 
 
 def _of(rows: Sequence[Row], solver: str) -> tuple[Row, ...]:
@@ -63,8 +67,8 @@ def _gap_claim(rows: Sequence[Row]) -> Claim | None:
 
 
 def _refinement_claim(coarse: Sequence[Row], fine: Sequence[Row]) -> Claim | None:
-    finer = {row.case: row for row in fine}
-    pairs = [(row, finer[row.case]) for row in coarse if row.case in finer]
+    finer = {row.setting: row for row in fine}
+    pairs = [(row, finer[row.setting]) for row in coarse if row.setting in finer]
     ratios = [_gap(b) / _gap(a) if a.solved and b.solved else float("inf") for a, b in pairs]
     if not ratios:
         return None
@@ -82,7 +86,7 @@ def _polish_claim(rows: Sequence[Row]) -> Claim | None:
     good = [
         row.status == "SOLVED"
         and abs(_gap(row)) <= 1e-6
-        and row.residual <= 1e-10
+        and _residual(row) <= 1e-10
         and row.iterations <= 3
         for row in rows
     ]
@@ -90,7 +94,7 @@ def _polish_claim(rows: Sequence[Row]) -> Claim | None:
         "polish: gap within 1e-6, residual <= 1e-10, at most 3 Newton steps, on all",
         all(good),
         f"{sum(good)} of {len(good)}; worst gap {max(abs(_gap(row)) for row in rows):.1e}, "
-        f"residual {max(row.residual for row in rows):.1e}, "
+        f"residual {max(map(_residual, rows)):.1e}, "
         f"steps {max(row.iterations for row in rows)}",
     )
 
@@ -131,3 +135,7 @@ def _multiple_claim(rows: Sequence[Row]) -> Claim | None:
 
 def _gap(row: Row) -> float:
     return row.gap if row.gap is not None and row.solved else float("inf")
+
+
+def _residual(row: Row) -> float:
+    return row.residual if row.residual is not None else float("inf")

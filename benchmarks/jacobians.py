@@ -28,11 +28,11 @@ def _group(row: Row) -> str:
     return row.case[: len("arm-00-links")] if row.suite == "links" else row.case.split("-")[-1]
 
 
-def _named(rows: Sequence[Row], solver: str) -> dict[str, Row]:
-    return {row.case: row for row in rows if row.solver == solver}
+def _named(rows: Sequence[Row], solver: str) -> dict[tuple, Row]:
+    return {row.setting: row for row in rows if row.solver == solver}
 
 
-def _cells(exact: dict[str, Row], varied: dict[str, Row]) -> list[str]:
+def _cells(exact: dict[tuple, Row], varied: dict[tuple, Row]) -> list[str]:
     both = [(exact[case], varied[case]) for case in exact if case in varied]
     solved = [(a, b) for a, b in both if a.solved and b.solved]
     ratios = [b.solve_time / a.solve_time for a, b in solved]
@@ -40,8 +40,12 @@ def _cells(exact: dict[str, Row], varied: dict[str, Row]) -> list[str]:
         f"{sum(a.solved for a, _ in both)} | {sum(b.solved for _, b in both)} of {len(both)}",
         _two(solved, lambda row: row.iterations, median, "{:.0f}"),
         f"{median(ratios):.2f}" if ratios else "-",
-        _two(solved, lambda row: row.residual, min, "{:.0e}"),
+        _two(solved, _residual, min, "{:.0e}"),
     ]
+
+
+def _residual(row: Row) -> float:
+    return row.residual if row.residual is not None else float("inf")
 
 
 def _two(pairs: list, value, of, form: str) -> str:

@@ -6,6 +6,7 @@ from time import perf_counter
 
 from benchmarks.cases import Case, Family
 from benchmarks.clearance import clearance_methods
+from benchmarks.library_methods import library_methods
 from benchmarks.method import Method, Outcome, Settings, judged, problem
 from benchmarks.thesis_methods import SHOOTING_STEPS, THESIS_GUESS, thesis_methods
 from ocp import Guess, Solution, Solver, Status, solve
@@ -58,11 +59,8 @@ def _multistart(case: Case, settings: Settings) -> Outcome:
     return judged(best.solution)
 
 
-def _polish(accuracy: float | None) -> Callable[[Case, Settings], Outcome]:
-    def run(case: Case, settings: Settings) -> Outcome:
-        return judged(polish(_multistart(case, settings).solution, accuracy=accuracy))
-
-    return run
+def _polish(case: Case, settings: Settings) -> Outcome:
+    return judged(polish(_multistart(case, settings).solution))
 
 
 def _cheapest_extremal(case: Case, settings: Settings) -> Outcome:
@@ -113,6 +111,7 @@ def all_methods() -> tuple[Method, ...]:
         *_multiple_shooting(),
         *clearance_methods(),
         *thesis_methods(),
+        *library_methods(),
     )
 
 
@@ -120,22 +119,21 @@ def _direct_methods() -> tuple[Method, ...]:
     coarse, fine = MultipleShooting(INTERVALS), MultipleShooting(2 * INTERVALS)
     fatrop = MultipleShooting(INTERVALS, backend="fatrop")
     extremal = IndirectShooting(segments=15)
-    suites, after = "arm textbook", "from direct-75"
+    suites, after = "arm", "from direct-75"
     return (
         _method(
             "direct-75", "direct", f"{suites} comparison", _multistart, coarse, "best of the starts"
         ),
         _method("direct-150", "direct", suites, _from_direct(fine), fine, after),
         _method("fatrop-75", "direct", suites, _plain(fatrop), fatrop, "own start"),
-        _method("polish", "polish", "arm", _polish(None), extremal, "direct-75 made extremal"),
+        _method("polish", "polish", "arm", _polish, extremal, "direct-75 made extremal"),
         _method("extremals", "polish", "arm", _cheapest_extremal, extremal, "cheapest of a scan"),
-        _method("polish-1e-10", "polish", "textbook", _polish(1e-10), extremal, "steps doubled"),
     )
 
 
 def _gradient_methods() -> tuple[Method, ...]:
     thesis, sound = Schuetz(step=FixedStep(0.01)), Schuetz.sound(intervals=INTERVALS)
-    suites = "arm textbook comparison"
+    suites = "arm comparison"
     return (
         _method("schuetz", "gradient", "arm", _with_local_gap(thesis), thesis, "Algorithm 2"),
         _method("schuetz-sound", "gradient", suites, _with_local_gap(sound), sound, "from zero"),

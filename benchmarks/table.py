@@ -37,19 +37,19 @@ def table_of(rows: Sequence[Row], title: str) -> Table:
     for column in _COLUMNS:
         justify = "left" if column == "solver" else "right"
         table.add_column(escape(column), justify=justify, no_wrap=True)
-    yardstick = {row.case: row.solve_time for row in rows if row.solver == rows[0].solver}
+    yardstick = {row.setting: row.solve_time for row in rows if row.solver == rows[0].solver}
     for name in dict.fromkeys(row.solver for row in rows):
         here = [row for row in rows if row.solver == name]
         table.add_row(name, *_cells(here, yardstick))
     return table
 
 
-def _cells(rows: Sequence[Row], yardstick: dict[str, float]) -> list[str]:
+def _cells(rows: Sequence[Row], yardstick: dict[tuple, float]) -> list[str]:
     solved = [row for row in rows if row.solved]
     gaps = [row.gap for row in solved if row.gap is not None]
     known = [row for row in rows if row.optimum is not None]
     violations = [row.violation for row in solved if row.violation is not None]
-    ratios = [row.solve_time / yardstick[row.case] for row in rows if row.case in yardstick]
+    ratios = [row.solve_time / yardstick[row.setting] for row in rows if row.setting in yardstick]
     return [
         str(len(rows)),
         str(len(solved)),

@@ -29,6 +29,7 @@ from ocp.mpc.recorder import FlightRecorder, Replay, replay, replay_all
 from ocp.mpc.rollout import Rollout
 from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.parameters import Parameter, ParameterValues, Signal
+from ocp.pieces import Pieces, bernstein, elevated
 from ocp.problem import OCP, FreeTime
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution import Solution, Work
@@ -70,6 +71,7 @@ __all__ = [
     "Outcome",
     "Parameter",
     "ParameterValues",
+    "Pieces",
     "Plant",
     "Polyhedron",
     "ProblemError",
@@ -89,12 +91,14 @@ __all__ = [
     "Transcription",
     "UnsupportedProblem",
     "Work",
+    "bernstein",
     "closed_loop",
     "compiled",
     "costates_along",
     "curvature",
     "derive",
     "discretise",
+    "elevated",
     "evaluate",
     "hamiltonian",
     "instance",

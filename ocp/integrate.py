@@ -93,29 +93,29 @@ class Stage:
     """One step of a problem, from (x, u, t, h, p0, p1) or (x, u0, u1, t, h, p0, p1).
 
     Controls and parameters run linearly from u0, p0 at t to u1, p1 at t + h; a held control
-    has only u. A discrete-time model takes u0, p0 and ignores h.
+    has only u, a curved one also its value in the middle, (x, u0, um, u1, ...). A discrete-time
+    model takes u0, p0 and ignores h.
 
     Attributes:
         step: -> (x after the step, cost of the step).
         adjoint: (costate after, x, u, ...) -> (costate before, dJ/du) or (..., dJ/du0, dJ/du1),
-            the exact derivative of the *discretised* cost.
+            with dJ/dum between them, the exact derivative of the *discretised* cost.
     """
 
     step: ca.Function
     adjoint: ca.Function
 
     @classmethod
-    def of(cls, ocp: "OCP", integrator: Integrator, *, held: bool) -> "Stage":
-        """Build the stage of a problem under an integrator."""
+    def of(cls, ocp: "OCP", integrator: Integrator, *, held: bool, curved: bool = False) -> "Stage":
+        """Build the stage of a problem under an integrator, for a control of one kind."""
         m, n_p = ocp.model, ocp.p.numel()
-        sizes = {"x": m.nx, "u0": m.nu, "u1": m.nu, "t": 1, "h": 1, "p0": n_p, "p1": n_p}
+        controls = ("u0",) if held else ("u0", "um", "u1") if curved else ("u0", "u1")
+        sizes = {"x": m.nx, **dict.fromkeys(controls, m.nu), "t": 1, "h": 1, "p0": n_p, "p1": n_p}
         symbols = {name: ca.SX.sym(name, size) for name, size in sizes.items()}
-        if held:
-            del symbols["u1"]
         after, cost = _one_step(ocp, integrator, {"u1": symbols["u0"], **symbols})
         costate = ca.SX.sym("costate", m.nx)
         total = cost + ca.dot(costate, after)
-        wanted = [v for name, v in symbols.items() if name in ("x", "u0", "u1")]
+        wanted = [v for name, v in symbols.items() if name in ("x", *controls)]
         gradients = [ca.densify(ca.gradient(total, v)) for v in wanted]
         inputs, names = list(symbols.values()), list(symbols)
         return cls(
@@ -132,12 +132,20 @@ def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[
 
     def rate(z: ca.SX, fraction: ca.SX | float) -> ca.SX:
         """d(x, cost) over the fraction of the interval, in [0, 1]."""
-        u, p = interpolate(s["u0"], s["u1"], fraction), interpolate(s["p0"], s["p1"], fraction)
-        now = (z[:nx], u, s["t"] + fraction * s["h"], p)
+        p = interpolate(s["p0"], s["p1"], fraction)
+        now = (z[:nx], _control(s, fraction), s["t"] + fraction * s["h"], p)
         return s["h"] * ca.vertcat(functions.rate(*now), functions.running_cost(*now))
 
     end = integrator(rate, ca.vertcat(s["x"], 0), 0.0, 1.0)
     return end[:nx], end[nx]
+
+
+def _control(s: dict[str, ca.SX], fraction: ca.SX | float) -> ca.SX:
+    """The line through u0 and u1, or the parabola through um as well."""
+    line = interpolate(s["u0"], s["u1"], fraction)
+    if "um" not in s:
+        return line
+    return line + 4.0 * fraction * (1.0 - fraction) * (s["um"] - (s["u0"] + s["u1"]) / 2)
 
 
 def interpolate(left: ca.SX, right: ca.SX, s: ca.SX | float) -> ca.SX:

@@ -74,8 +74,8 @@ def plot_solution(solution: Solution) -> Figure:
 
 
 def _instants(solution: Solution) -> np.ndarray:
-    """The nodes, and for an extremal many instants between them."""
-    if solution.control_kind != "extremal":
+    """The nodes, and for controls that are curved between them many instants more."""
+    if solution.control_kind not in ("extremal", "polynomial"):
         return solution.t
     return np.union1d(solution.t, np.linspace(solution.t[0], solution.t[-1], _POINTS))
 

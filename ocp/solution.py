@@ -14,13 +14,14 @@ from ocp.archive import read_archive, write_archive
 from ocp.data import Data
 from ocp.errors import ProblemError, SolverError
 from ocp.optimality import derive
+from ocp.pieces import Pieces
 from ocp.problem import OCP
 from ocp.status import Status
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ControlKind = Literal["held", "linear", "extremal"]
+ControlKind = Literal["held", "linear", "polynomial", "extremal"]
 
 
 @dataclass(frozen=True)
@@ -55,10 +56,14 @@ class Solution:
         x: states, (N + 1, nx).
         x0: the start that was asked for, (nx,); a guess of it where the start is free.
         costate: dJ*/dx at the nodes, (N + 1, nx); where a state bound is active the costate
-            jumps, and the value just before the node is kept.
-        u: controls, (N, nu) where held, else (N + 1, nu).
-        control_kind: ``"held"`` between nodes, ``"linear"``, or ``"extremal"``: the
-            control minimising the Hamiltonian along state and costate.
+            jumps, and the value just before the node is kept (by collocation just after it).
+        u: controls, (N, nu) where held, else (N + 1, nu); of K polynomials the coefficients,
+            (K m, nu), see ``Pieces``.
+        control_kind: ``"held"`` between nodes, ``"linear"``, ``"polynomial"`` from break to
+            break, or ``"extremal"``: the control minimising the Hamiltonian along state and
+            costate.
+        breaks: which nodes the pieces of a polynomial control meet at, (K + 1,), from 0 to N;
+            empty for the other kinds.
         cost: what the solver believes; only ``evaluate`` says what it is.
         residual: the solver's own measure of optimality (its unit is the solver's).
         iterations: iterations of the outer method.
@@ -79,6 +84,7 @@ class Solution:
     costate: np.ndarray
     u: np.ndarray
     control_kind: ControlKind = "held"
+    breaks: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     cost: float
     residual: float = 0.0
     iterations: int = 0
@@ -91,7 +97,10 @@ class Solution:
     def __post_init__(self) -> None:
         """Check shapes, and that no number is NaN."""
         n, m = len(self.t), self.problem.model
+        object.__setattr__(self, "breaks", np.asarray(self.breaks, dtype=int))
         rows = n - 1 if self.control_kind == "held" else n
+        if self.control_kind == "polynomial":
+            rows = self._check_breaks()
         for name, shape in (
             ("t", (n,)),
             ("x", (n, m.nx)),
@@ -109,6 +118,15 @@ class Solution:
         for name in ("cost", "residual"):
             if np.isnan(getattr(self, name)):
                 raise ProblemError(f"solution: {name} is NaN")
+
+    def _check_breaks(self) -> int:
+        """Return how many coefficients there must be: as many as there are, if that fits."""
+        last, breaks = len(self.t) - 1, self.breaks
+        increasing = breaks.ndim == 1 and len(breaks) > 1 and (np.diff(breaks) > 0).all()
+        if not increasing or breaks[0] != 0 or breaks[-1] != last:
+            raise ProblemError(f"solution: breaks = {breaks}, they must increase from 0 to {last}")
+        pieces = len(breaks) - 1
+        return max(1, len(self.u) // pieces) * pieces
 
     def __repr__(self) -> str:
         """Return one line: what was solved, how it ended, what the solver believes it costs."""
@@ -167,6 +185,9 @@ class Solution:
             return self.u[np.clip(index, 0, len(self.u) - 1)]
         if self.control_kind == "linear":
             return _interpolate(times, self.t, self.u)
+        if self.control_kind == "polynomial":
+            values = self.pieces.at(np.atleast_1d(times))
+            return values if times.ndim else values[0]
         points = np.atleast_1d(times)
         tau = (points - self.t[0]) / self.duration
         p = self.problem.parameter_values(self.parameters).at(tau)
@@ -174,6 +195,13 @@ class Solution:
         args = (self.state(points), self.costate_at(points), points[:, None], p)
         values = np.array(law.map(len(points))(*[a.T for a in args])).T
         return values if times.ndim else values[0]
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The polynomials of a control of that kind."""
+        count = len(self.breaks) - 1
+        coefficients = self.u.reshape(count, -1, self.problem.model.nu)
+        return Pieces(self.t[self.breaks], coefficients)
 
     def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
         """Return x, u or costate at fractions of the horizon: a solution is also a guess."""
@@ -222,6 +250,7 @@ class Solution:
         }
         content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
         content |= {"status": self.status.name, "problem": self.problem.name}
+        content |= {"breaks": self.breaks}
         return write_archive(path, content)
 
     @classmethod
@@ -233,6 +262,7 @@ class Solution:
         """
         needed = {"status", "problem", *_ARRAYS, *_SCALARS}
         data = read_archive(path, "solution", needed)
+        data.setdefault("breaks", np.empty(0, dtype=int))  # files of before there were any
         if str(data["problem"]) != problem.name:
             raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
         groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}}
@@ -245,7 +275,7 @@ class Solution:
         return cls(
             problem=problem,
             status=Status[str(data["status"])],
-            **{name: data[name] for name in _ARRAYS},
+            **{name: data[name] for name in (*_ARRAYS, "breaks")},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
             history=groups["history"],
             parameters=groups["parameters"],

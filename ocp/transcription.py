@@ -85,6 +85,23 @@ class Transcription:
         stages = w[: -self.nz].reshape(self.n, -1)
         return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
 
+    @property
+    def is_control(self) -> np.ndarray:
+        """Which unknowns are controls, bool (size,)."""
+        z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
+        return self.join(z, u).astype(bool)
+
+    @property
+    def is_later_state(self) -> np.ndarray:
+        """Which unknowns are states after the start, bool (size,)."""
+        z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)
+        z[0] = 0.0
+        return self.join(z, np.zeros((self.n, self.ocp.model.nu))).astype(bool)
+
+    def duration(self, w: np.ndarray) -> float:
+        """Return final time minus t0 [s] of a vector of unknowns."""
+        return float(w[-1]) if self.ocp.has_free_time else self.ocp.duration
+
     # -- the stage ----------------------------------------------------------------------
 
     @cached_property

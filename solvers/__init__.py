@@ -1,5 +1,8 @@
 """One method a file; a solver is a frozen dataclass whose fields are its options."""
 
+from solvers.collocation.collocation import Collocation
+from solvers.collocation.mesh import Mesh
+from solvers.collocation.refined import Refinement, Round, refined
 from solvers.constrained.augmented_lagrangian import AugmentedLagrangian
 from solvers.constrained.between_nodes import BetweenNodes
 from solvers.constrained.raised import raise_until_clear
@@ -41,6 +44,7 @@ __all__ = [
     "Axis",
     "Batch",
     "BetweenNodes",
+    "Collocation",
     "Damped",
     "Enumeration",
     "Exact",
@@ -60,12 +64,15 @@ __all__ = [
     "LinearMPC",
     "LocalOptimum",
     "Manifold",
+    "Mesh",
     "MultipleShooting",
     "ParameterContinuation",
     "PrioritisedKinematics",
+    "Refinement",
     "Repulsion",
     "ReverseShooting",
     "Riccati",
+    "Round",
     "Scan",
     "Schuetz",
     "SecondOrder",
@@ -82,6 +89,7 @@ __all__ = [
     "prioritised_velocity",
     "raise_until_clear",
     "random_guesses",
+    "refined",
     "repel",
     "second_order",
     "seeds_around",

@@ -1,7 +1,7 @@
 """The one problem library: benchmarks and tests take their problems from here."""
 
 from benchmarks.cases.arm import arm_cases, arm_parts, arm_scenario, comparison_cases
-from benchmarks.cases.case import Case, Family
+from benchmarks.cases.case import Case, Difficulty, Family, Published, Reference
 from benchmarks.cases.clearance import (
     Kind,
     clearance_cases,
@@ -9,14 +9,14 @@ from benchmarks.cases.clearance import (
     required_names,
     soft_optimum,
 )
+from benchmarks.cases.library.every import LIBRARY, TEXTBOOK
 from benchmarks.cases.links import link_cases
-from benchmarks.cases.textbook import TEXTBOOK
 
 
 def all_cases() -> tuple[Case, ...]:
     """Return every case of every suite."""
     return (
-        *TEXTBOOK,
+        *LIBRARY,
         *arm_cases(),
         *comparison_cases(),
         *link_cases(),
@@ -25,10 +25,14 @@ def all_cases() -> tuple[Case, ...]:
 
 
 __all__ = [
+    "LIBRARY",
     "TEXTBOOK",
     "Case",
+    "Difficulty",
     "Family",
     "Kind",
+    "Published",
+    "Reference",
     "all_cases",
     "arm_cases",
     "arm_parts",

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 
-from benchmarks.cases.case import Case, Family
+from benchmarks.cases.case import Case, Family, Reference
 from models import ArmScenario, Combine
 from ocp import OCP
 
@@ -15,6 +15,8 @@ _FAMILIES: dict[Combine, frozenset[Family]] = {
     "closest": frozenset({"direct", "gradient"}),
 }
 _COMPARED = "compare-"
+_HOW = "best of direct starts, polished, for sum also enumerated extremals; 7-8 digits"
+_ACCURACY = 1e-7
 
 
 @cache
@@ -46,13 +48,17 @@ def _case(name: str, combine: Combine) -> Case:
         name=f"{name}-{combine}",
         suite="arm",
         build=partial(_build, name, combine),
-        reference=best["cost"],
-        source="best of direct starts, polished, for sum also enumerated extremals; 7-8 digits",
-        accuracy=1e-7,
+        source="seeded scenario of the thesis' arm",
+        reference=_reference(best["cost"]),
+        difficulty="nonconvex",
         families=_FAMILIES[combine],
         costate0=tuple(best["costate0"]) if best["costate0"] else None,
         local_costs=tuple(best["local_costs"]),
     )
+
+
+def _reference(cost: float | None) -> Reference | None:
+    return None if cost is None else Reference(cost, _ACCURACY * abs(cost), _HOW)
 
 
 def _build(name: str, combine: Combine) -> OCP:

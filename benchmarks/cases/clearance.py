@@ -58,8 +58,9 @@ def clearance_cases() -> tuple[Case, ...]:
             name=f"{name}-{kind}",
             suite=suite,
             build=partial(_build, name, kind),
+            source="the arm's scenarios; costs are compared among the methods",
             reference=None,
-            source="none: costs are compared among the methods",
+            difficulty="state-constrained",
             families=frozenset({"clearance"}),
         )
         for suite, kind in suites

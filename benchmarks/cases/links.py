@@ -22,8 +22,9 @@ def link_cases() -> tuple[Case, ...]:
             name=f"arm-{links:02d}-links-{index}",
             suite="links",
             build=partial(_build, links, index),
-            reference=None,
             source="seeded random scenario",
+            reference=None,
+            difficulty="nonconvex",
             families=frozenset({"direct", "gradient", "indirect", "polish"}),
         )
         for links in LINKS

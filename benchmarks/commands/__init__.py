@@ -7,12 +7,14 @@ from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, MPC
 from benchmarks.commands.peers import PEERS_COMMAND
+from benchmarks.commands.report import REPORT
 from benchmarks.commands.run import RUN
 from benchmarks.commands.speed import ARM_SPEED, SPEED
 
 COMMANDS: tuple[Command, ...] = (
     LIST,
     RUN,
+    REPORT,
     BENCH,
     FIGURES_COMMAND,
     SPEED,

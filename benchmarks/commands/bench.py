@@ -8,6 +8,7 @@ from benchmarks.cases import all_cases
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import add_out, add_workers, named
 from benchmarks.commands.swept import print_sweep
+from benchmarks.executors import Execution
 from benchmarks.method import Settings
 from benchmarks.methods import all_methods
 from benchmarks.pictures import bench_picture
@@ -35,7 +36,13 @@ def _run(options: Namespace, console: Console) -> int:
     cases = named(all_cases(), BENCH_CASES, "case")
     methods = named(all_methods(), BENCH_METHODS, "solver")
     code = print_sweep(
-        console, cases, methods, Settings(starts=4), options.out, options.workers, resume=False
+        console,
+        cases,
+        methods,
+        [Settings(starts=4)],
+        options.out,
+        Execution(options.workers),
+        resume=False,
     )
     console.print(f"picture: {bench_picture(BENCH_CASES[0], options.out)}")
     return code

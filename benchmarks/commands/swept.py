@@ -1,6 +1,6 @@
 """A sweep on the console: its tables, its claims, its exit code."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -9,37 +9,62 @@ from benchmarks.cases import Case
 from benchmarks.claims import below_reference, claims_of
 from benchmarks.comparison import SUITE as COMPARISON
 from benchmarks.comparison import comparison_claims, comparison_table
+from benchmarks.executors import Execution
 from benchmarks.extremes import extremes_table
+from benchmarks.guard import SweepError
 from benchmarks.jacobians import jacobian_table
 from benchmarks.method import Method, Settings
 from benchmarks.row import RESULTS, Row
-from benchmarks.sweep import sweep, tasks_of
+from benchmarks.sweep import sweep
 from benchmarks.table import table_of
+from benchmarks.task import tasks_of
 
 
 def print_sweep(
     console: Console,
     cases: Sequence[Case],
     methods: Sequence[Method],
-    settings: Settings,
+    settings: Sequence[Settings],
     out: Path,
-    workers: int,
+    execution: Execution,
+    *,
     resume: bool,
+    retry: bool = False,
 ) -> int:
     """Run the methods on the cases that declare them, print all that the rows say, judge them.
 
     Returns:
         0 if every claim holds and no reference is disproved, 1 if not, 2 if there was nothing to
-        run.
+        run or nobody to run it, 130 if it was interrupted.
     """
-    tasks = tasks_of(cases, methods, settings)
+    tasks = tasks_of(cases, methods, *settings)
     if not tasks:
         console.print("no solver declares these cases: nothing to run")
         return 2
-    rows = sweep(tasks, out, workers=workers, resume=resume)
+
+    def say(note: str) -> None:
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+
+    try:
+        rows = sweep(tasks, out, execution=execution, resume=resume, retry=retry, say=say)
+    except SweepError as ended:
+        say(f"{ended}; what is in {out / RESULTS} is kept, --resume goes on from there")
+        return 2
+    except KeyboardInterrupt:
+        say(f"interrupted; what is in {out / RESULTS} is kept, --resume goes on from there")
+        return 130
     _print_tables(console, rows)
+    _print_lost(say, rows)
     console.print(f"rows: {out / RESULTS}")
     return _judge(console, rows)
+
+
+def _print_lost(say: Callable[[str], None], rows: Sequence[Row]) -> None:
+    lost = [row for row in rows if row.is_lost]
+    for row in lost:
+        say(f"{row.status}: {row.solver} on {row.case}: {row.message}")
+    if lost:
+        say("--resume --retry computes these again")
 
 
 def _print_tables(console: Console, rows: Sequence[Row]) -> None:

@@ -41,7 +41,9 @@ def _solved(horizon: float, *, damped: bool) -> Solution:
 
 def _sentence(runs: dict[tuple[str, float], Solution]) -> str:
     steps = ", ".join(f"{runs['undamped', h].iterations} at {h:g} s" for h in _HORIZONS)
-    best = next(c.reference for c in all_cases() if c.name == f"{_SCENARIO}-sum") or np.nan
+    best = next(
+        c.reference.value for c in all_cases() if c.name == f"{_SCENARIO}-sum" and c.reference
+    )
     long, tamed = runs["undamped", _HORIZONS[-1]], runs["damped", _HORIZONS[-1]]
     return (
         f"Fig. 3.6: undamped Newton steps: {steps}, at the longest horizon wandering about for "

@@ -177,7 +177,7 @@ class Ladder:
         if plan.status.is_success:
             if not self._is_constrained:
                 return 0.0, ""
-            u, ends = plan.u[: len(plan.t) - 1], self._ends(moment, plan.t)
+            u, ends = controls(plan, plan.t[:-1]), self._ends(moment, plan.t)
             return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
         if plan.status not in _USABLE:
             return np.inf, plan.status.value

@@ -23,7 +23,13 @@ _VECTOR = -1
 # A place in one of these is a byte of the head; the first entry of each: there is none.
 _OUTCOMES: tuple[Outcome | None, ...] = (None, *Outcome)
 _STATUSES: tuple[Status | None, ...] = (None, *Status)
-_KINDS: tuple[ControlKind | None, ...] = (None, "held", "linear", "extremal")
+_KINDS: tuple[ControlKind | None, ...] = (
+    None,
+    "held",
+    "linear",
+    "polynomial",
+    "extremal",
+)
 _OUTCOME, _STATUS, _KIND = (
     {entry: place for place, entry in enumerate(entries)}
     for entries in (_OUTCOMES, _STATUSES, _KINDS)
@@ -40,6 +46,10 @@ class Plan(NamedTuple):
     x0: np.ndarray
     costate: np.ndarray
     u: np.ndarray
+    breaks: np.ndarray
+
+
+_ARRAYS = Plan._fields[2:]
 
 
 class Record(NamedTuple):
@@ -91,7 +101,7 @@ def packed(measured: np.ndarray, step: Attempt, plan: Solution | None) -> bytes:
     if decision:
         arrays.append(decision.input)
     if plan:
-        arrays += (plan.t, plan.x, plan.x0, plan.costate, plan.u)
+        arrays += (plan.t, plan.x, plan.x0, plan.costate, plan.u, plan.breaks)
     arrays += step.parameters.values()
     arrays = [np.asarray(array, dtype=float) for array in arrays]
     pieces = [_SHAPE.pack(*array.shape, *(_VECTOR,) * (2 - array.ndim)) for array in arrays]
@@ -155,8 +165,8 @@ def _unpacked(head: bytes, body: bytes, names: Sequence[str]) -> Record:
     sent = next(rest) if outcome else None
     plan = None
     if kind:
-        five = [next(rest) for _ in range(5)]
-        plan = Plan(_KINDS[kind], _STATUSES[made], *five)  # pyright: ignore[reportArgumentType]
+        own = [next(rest) for _ in _ARRAYS]
+        plan = Plan(_KINDS[kind], _STATUSES[made], *own)  # pyright: ignore[reportArgumentType]
     return Record(
         t=t,
         outcome=_OUTCOMES[outcome],

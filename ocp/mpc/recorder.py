@@ -157,6 +157,7 @@ def _plan(mpc: MPC, record: Record) -> Solution | None:
         costate=record.plan.costate,
         u=record.plan.u,
         control_kind=record.plan.kind,
+        breaks=record.plan.breaks,
         cost=0.0,
         parameters=record.parameters,
     )

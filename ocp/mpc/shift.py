@@ -52,6 +52,9 @@ def controls(plan: Solution, times: np.ndarray | float) -> np.ndarray:
     """
     if plan.control_kind == "held":
         return plan.u[_interval(times + 1e-9 * plan.duration, plan.t)]
+    if plan.control_kind == "polynomial":
+        values = plan.pieces.at(np.atleast_1d(times))
+        return values if np.ndim(times) else values[0]
     return _along(_within(times, plan.t), plan.t, plan.u)
 
 

@@ -21,8 +21,9 @@ class Evaluation:
         worst: which one, and when; empty where nothing is violated.
         stationarity: residual of the minimum principle, max over time of
             abs(u - clip(u - H_u)) with the referee's own costates, for a held control
-            averaged over its interval, and of transversality at free ends; None where a path
-            constraint or state bound is active (its multiplier would be needed).
+            averaged over its interval, for a polynomial one by its coefficients, and of
+            transversality at free ends; None where a path constraint or state bound is active
+            (its multiplier would be needed).
         task_drift: largest violation of the problem's invariants.
         defect: largest distance of the solution's states from the true ones at its nodes.
         truth: the trajectory itself.
@@ -84,6 +85,6 @@ def costates_along(solution: Solution) -> Solution:
     truth = follow(solution)
     if not truth.is_finite:
         return solution
-    costates, _, _ = adjoint(solution, truth, final_costate(solution, truth)[0])
+    costates, _ = adjoint(solution, truth, final_costate(solution, truth)[0])
     rows = [np.interp(solution.t, truth.t, c) for c in costates.T]
     return solution.with_(costate=np.stack(rows, axis=1))

@@ -17,20 +17,23 @@ _ACTIVE = 1e-5
 def stationarity(solution: Solution, truth: Truth) -> float | None:
     """Return the residual of the minimum principle with the referee's own costates.
 
-    The largest of abs(u - clip(u - H_u)) over time (for held and linear controls dJ/du per
-    second of their support), of the costate's distance from the normals of the start
-    manifold, and of the natural residual of a free final time. None where a path constraint or
-    a state bound is active: its multiplier would be needed.
+    The largest of abs(u - clip(u - H_u)) over time (for held, linear and polynomial controls
+    dJ/du of their values or coefficients, per second of their support), of the costate's
+    distance from the normals of the start manifold, and of the natural residual of a free
+    final time. None where a path constraint or a state bound is active: its multiplier would
+    be needed.
     """
     ocp = solution.problem
     if _path_is_active(solution, truth):
         return None
     final, at_end = final_costate(solution, truth)
-    costates, g0, g1 = adjoint(solution, truth, final)
+    costates, gradients = adjoint(solution, truth, final)
     if solution.control_kind == "extremal":
         controls, slopes = _pointwise(solution, truth, costates)
+    elif solution.control_kind == "polynomial":
+        controls, slopes = _by_coefficient(solution, truth, gradients)
     else:
-        controls, slopes = _averaged(solution, truth, g0, g1)
+        controls, slopes = _averaged(solution, truth, *gradients)
     residual = np.abs(controls - ocp.control_bounds.clip(controls - slopes)).max(initial=0.0)
     ends = (
         _start_residual(solution, truth, costates[0]),
@@ -85,6 +88,19 @@ def _averaged(
     if solution.problem.model.is_discrete:
         weight[:] = 1.0
     return u, gradient / weight[:, None]
+
+
+def _by_coefficient(
+    solution: Solution, truth: Truth, gradients: tuple[np.ndarray, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients and dJ/dc of each, per second of its support (the integral of its basis)."""
+    pieces, t = solution.pieces, truth.t
+    middle = (t[1:] + t[:-1]) / 2
+    piece, gradient = pieces.of(middle), np.zeros_like(pieces.coefficients)
+    for g, at in zip(gradients, (t[:-1], middle, t[1:]), strict=True):
+        np.add.at(gradient, piece, pieces.basis(at, piece)[:, :, None] * g[:, None, :])
+    weight = np.diff(pieces.edges) / pieces.coefficients.shape[1]
+    return solution.u, (gradient / weight[:, None, None]).reshape(solution.u.shape)
 
 
 def final_costate(solution: Solution, truth: Truth) -> tuple[np.ndarray, float]:

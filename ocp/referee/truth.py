@@ -28,6 +28,7 @@ class Truth:
         x: (K + 1, nx).
         u_start: control at the start of each step, (K, nu).
         u_end: control at the end of each step (its limit from the left), (K, nu).
+        u_middle: control in the middle of each step (polynomials), (K, nu).
         p_start: parameters at the start of each step, (K, n_p).
         p_end: parameters at the end of each step, (K, n_p).
         cost: running plus terminal cost.
@@ -45,6 +46,7 @@ class Truth:
     cost: float
     cost_error: float
     inner: np.ndarray
+    u_middle: np.ndarray
     substeps: int
 
     @property
@@ -86,22 +88,26 @@ def follow(solution: Solution, *, tolerance: float = 1e-9) -> Truth:
 
 def adjoint(
     solution: Solution, truth: Truth, final: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return costates (K + 1, nx) and gradients dJ/du at both ends of each step, (K, nu) each.
+) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Return costates (K + 1, nx), and gradients dJ/du at both ends of each step, (K, nu) each.
 
+    Between those of the ends stands that of the middle, where the control is polynomial.
     The adjoint of the discretised trajectory itself, from ``final`` backwards: consistent
     to the order of the integrator, with no error of its own. For an extremal the gradients
     are zero: its controls have no parameters.
     """
     machine = _machine(solution)
     inputs = _adjoint_inputs(solution, truth)
-    costate, g0, g1 = machine.adjoint([final], [array[::-1] for array in inputs])
-    return np.vstack([costate[::-1], final]), g0[::-1], g1[::-1]
+    costate, *gradients = machine.adjoint([final], [array[::-1] for array in inputs])
+    return np.vstack([costate[::-1], final]), tuple(g[::-1] for g in gradients)
 
 
 def _adjoint_inputs(solution: Solution, truth: Truth) -> list[np.ndarray]:
     steps = np.diff(truth.t)[:, None]
-    drive = [truth.inner] if solution.control_kind == "extremal" else [truth.u_start, truth.u_end]
+    drive = {
+        "extremal": [truth.inner],
+        "polynomial": [truth.u_start, truth.u_middle, truth.u_end],
+    }.get(solution.control_kind, [truth.u_start, truth.u_end])
     return [truth.x[:-1], *drive, truth.t[:-1, None], steps, truth.p_start, truth.p_end]
 
 
@@ -122,8 +128,8 @@ def _roll(solution: Solution, substeps: int) -> Truth:
     p_start, p_end = values.on(fine)
     start = solution.x[0] if ocp.has_free_start else solution.x0
     schedule = [t[:-1, None], np.diff(t)[:, None], p_start, p_end]
-    follow_controls = _roll_extremal if solution.control_kind == "extremal" else _roll_controls
-    x, cost, u_start, u_end, inner = follow_controls(solution, fine, start, schedule)
+    follow_controls = _ROLLS.get(solution.control_kind, _roll_controls)
+    x, cost, u_start, u_end, inner, u_middle = follow_controls(solution, fine, start, schedule)
     cost += float(ocp.functions.terminal_cost(x[-1], t[-1], values.at(1.0)[0]))
     return Truth(
         t=t,
@@ -135,11 +141,12 @@ def _roll(solution: Solution, substeps: int) -> Truth:
         cost=cost,
         cost_error=0.0,
         inner=inner,
+        u_middle=u_middle,
         substeps=substeps,
     )
 
 
-Rolled = tuple[np.ndarray, float, np.ndarray, np.ndarray, np.ndarray]
+Rolled = tuple[np.ndarray, float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def _roll_controls(
@@ -156,7 +163,21 @@ def _roll_controls(
         u_start, u_end = u[:-1], u[1:]
     machine = _machine(solution)
     x, costs = machine.step([start], [u_start, u_end, *schedule])
-    return np.vstack([start, x]), float(costs.sum()), u_start, u_end, np.empty((len(u_start), 0))
+    nothing = np.empty((len(u_start), 0))
+    return np.vstack([start, x]), float(costs.sum()), u_start, u_end, nothing, nothing
+
+
+def _roll_polynomials(
+    solution: Solution, fine: np.ndarray, start: np.ndarray, schedule: list
+) -> Rolled:
+    """Polynomials from break to break: a step of RK4 sees both ends and the middle exactly."""
+    t = solution.t[0] + fine * solution.duration
+    middle, pieces = (t[1:] + t[:-1]) / 2, solution.pieces
+    piece = pieces.of(middle)
+    u_start, u_middle, u_end = (pieces.at(at, piece) for at in (t[:-1], middle, t[1:]))
+    x, costs = _machine(solution).step([start], [u_start, u_middle, u_end, *schedule])
+    nothing = np.empty((len(u_start), 0))
+    return np.vstack([start, x]), float(costs.sum()), u_start, u_end, nothing, u_middle
 
 
 def _roll_extremal(
@@ -173,7 +194,11 @@ def _roll_extremal(
     machine = _machine(solution)
     inputs = [restart, z_node, *schedule]
     x, _, costs, inner, u_start, u_end = machine.step([start, z_node[0]], inputs)
-    return np.vstack([start, x]), float(costs.sum()), u_start, u_end, inner
+    nothing = np.empty((len(u_start), 0))
+    return np.vstack([start, x]), float(costs.sum()), u_start, u_end, inner, nothing
+
+
+_ROLLS = {"extremal": _roll_extremal, "polynomial": _roll_polynomials}
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,13 +210,19 @@ class _Machine:
 
 
 def _machine(solution: Solution) -> _Machine:
-    extremal = solution.control_kind == "extremal"
-    return (_extremal_machine if extremal else _control_machine)(solution.problem)
+    machines = {"extremal": _extremal_machine, "polynomial": _polynomial_machine}
+    return machines.get(solution.control_kind, _control_machine)(solution.problem)
 
 
 @once_per_problem
 def _control_machine(ocp: OCP) -> _Machine:
     stage = Stage.of(ocp, RK4(), held=False)
+    return _Machine(step=March(stage.step), adjoint=March(stage.adjoint))
+
+
+@once_per_problem
+def _polynomial_machine(ocp: OCP) -> _Machine:
+    stage = Stage.of(ocp, RK4(), held=False, curved=True)
     return _Machine(step=March(stage.step), adjoint=March(stage.adjoint))
 
 

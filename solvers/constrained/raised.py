@@ -95,6 +95,6 @@ def raise_until_clear(
     )
 
 
-def _kind(run: Solution) -> Literal["held", "linear", "extremal"]:
+def _kind(run: Solution) -> Literal["held", "linear", "polynomial", "extremal"]:
     """What the controls are for another problem, whose Hamiltonian does not give them."""
     return "linear" if run.control_kind == "extremal" else run.control_kind

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import ProblemError, Transcription, UnsupportedProblem, Work, whole
+from solvers.direct.transcribed import Transcribed
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Backend:
         if not self.tolerance > 0.0:
             raise ProblemError("a backend needs a positive tolerance")
 
-    def build(self, transcription: Transcription) -> "Nlp":
+    def build(self, transcription: Transcribed) -> "Nlp":
         """Set the backend up for a transcribed problem.
 
         Raises:
@@ -57,7 +58,9 @@ class Backend:
         relax = {"ipopt.bound_relax_factor": 0.0}
         return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax}
 
-    def _fatrop(self, transcription: Transcription) -> dict[str, Any]:
+    def _fatrop(self, transcription: Transcribed) -> dict[str, Any]:
+        if not isinstance(transcription, Transcription):
+            raise UnsupportedProblem("fatrop takes the stages of multiple shooting alone")
         _refuse_for_fatrop(transcription)
         return {
             "structure_detection": "auto",

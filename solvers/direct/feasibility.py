@@ -6,8 +6,9 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import Row, Transcription
+from ocp import OCP, Box, Data, Row
 from solvers.direct.backend import Answer
+from solvers.direct.transcribed import Transcribed
 
 # The cost, scaled by this, only picks one among the least violating trajectories.
 _TIE_BREAK = 1e-4
@@ -28,7 +29,7 @@ class Feasibility:
         transcription: the problem on its grid.
     """
 
-    transcription: Transcription
+    transcription: Transcribed
 
     @cached_property
     def _soft(self) -> np.ndarray:
@@ -37,10 +38,7 @@ class Feasibility:
     @cached_property
     def _states(self) -> np.ndarray:
         """Whether an unknown is a state that may leave its bounds; the start may not."""
-        tr = self.transcription
-        z = np.tile(np.arange(tr.nz) < tr.ocp.model.nx, (tr.n + 1, 1))
-        z[0] = False
-        return tr.join(z.astype(float), np.zeros((tr.n, tr.ocp.model.nu))).astype(bool)
+        return self.transcription.is_later_state
 
     @cached_property
     def _nlp(self) -> ca.Function:
@@ -99,3 +97,29 @@ class Feasibility:
         program = self.transcription.program
         inputs, outputs = (program["x"], program["p"]), (program["f"], program["g"])
         return ca.Function("values", inputs, outputs)
+
+
+def start_violation(ocp: OCP, data: Data) -> tuple[float, Row | None]:
+    """Return by how much a given start violates what no grid imposes there, and which it is.
+
+    Only what the start alone decides counts: state bounds, and path constraints without the
+    control.
+    """
+    if ocp.has_free_start:
+        return 0.0, None
+    bounds = ocp.state_bounds.excess(data.x0)
+    found = [
+        (float(excess), Row(f"bound of {name}", "path", 0, 0.0, 0.0))
+        for name, excess in zip(ocp.model.x_names, bounds, strict=True)
+    ]
+    path = ocp.at("path")
+    if path:
+        low, high = (np.concatenate([getattr(c, s) for c in path]) for s in ("lower", "upper"))
+        u = ocp.control_bounds.clip(np.zeros(ocp.model.nu))
+        value = ocp.functions.path(data.x0, u, data.t0, data.values.at(0.0)[0])
+        excess = Box(low, high).excess(np.array(value).ravel())
+        alone = np.where(ocp.functions.path_on_control, 0.0, excess)
+        names = [c.name for c in path for _ in range(c.size)]
+        for name, e, lower, upper in zip(names, alone, low, high, strict=True):
+            found.append((float(e), Row(name, "path", 0, float(lower), float(upper))))
+    return max(found, key=lambda pair: pair[0])

@@ -18,9 +18,10 @@ def row(**changes) -> Row:
     """A row that bears every claim out."""
     good = Row(
         suite="arm", case=CASE.name, solver="direct-75", settings="", starts=1, seed=0,
-        status="SOLVED", message="", solved=True, optimum=True, cost=1.0, reference=1.0, gap=1e-4,
-        local_gap=1e-9, violation=0.0, worst="", stationarity=0.0, task_drift=0.0, residual=1e-12,
-        iterations=2, rollouts=1, jacobians=1, factorisations=1, build_time=0.1, solve_time=0.1,
+        status="SOLVED", message="", solved=True, optimum=True, cost=1.0, reference=1.0, lower=1.0,
+        gap=1e-4, local_gap=1e-9, violation=0.0, worst="", stationarity=0.0, task_drift=0.0,
+        residual=1e-12, iterations=2, rollouts=1, jacobians=1, factorisations=1,
+        build_time=0.1, solve_time=0.1, states=3, controls=1, intervals=75, when="",
         versions={}, machine={},
     )  # fmt: skip
     return replace(good, **changes)
@@ -54,11 +55,14 @@ def test_refinement_is_judged_case_by_case():
 
 
 def test_a_cost_below_its_reference_disproves_it():
-    assert below_reference([row(gap=-2e-6)])
-    assert not below_reference([row(gap=-0.5e-6)])
+    assert below_reference([row(cost=1.0 - 2e-6)])
+    assert not below_reference([row(cost=1.0 - 0.5e-6)])
+    # Within the interval of the reference it is no disproof.
+    assert not below_reference([row(cost=1.0 - 2e-6, lower=1.0 - 1e-5)])
+    assert not below_reference([row(cost=1.0 - 2e-6, lower=None)])
     # A method may not stand behind it, the referee does.
-    assert below_reference([row(gap=-2e-6, solved=False, status="SMALL_DECREASE")])
-    assert not below_reference([row(gap=-2e-6, violation=1e-5)])
+    assert below_reference([row(cost=1.0 - 2e-6, solved=False, status="SMALL_DECREASE")])
+    assert not below_reference([row(cost=1.0 - 2e-6, violation=1e-5)])
 
 
 def test_tables_have_a_line_for_each_method_and_survive_failures():

@@ -30,6 +30,7 @@ from ocp import (
     solve,
 )
 from solvers import (
+    Collocation,
     Greedy,
     IndirectShooting,
     LinearMPC,
@@ -56,6 +57,7 @@ def driver(**options) -> MPC:
     [
         MultipleShooting(20),
         StagewiseNewton(20),
+        Collocation(8, 3),
         Schuetz.sound(intervals=20),
         IndirectShooting(),
         Greedy(intervals=20),

@@ -24,6 +24,7 @@ from ocp import (
 )
 from solvers import (
     Armijo,
+    Collocation,
     FixedStep,
     HorizonContinuation,
     IndirectShooting,
@@ -33,7 +34,8 @@ from solvers import (
 )
 from tests.solvers.problems import changed, ends, moving, point
 
-DIRECT = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
+SHOOTING = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
+DIRECT = (*SHOOTING, Collocation(10, 3), Collocation(10, 3, points="gauss"))
 ALL = (
     *DIRECT,
     StagewiseNewton(20),
@@ -46,7 +48,9 @@ ALL = (
     Schuetz(step=FixedStep(1e3), stop_on_rise=False),
     Schuetz(gradient="discrete", step=Armijo(most=2)),
 )
-direct = pytest.mark.parametrize("solver", DIRECT, ids=lambda s: s.backend)
+direct = pytest.mark.parametrize(
+    "solver", DIRECT, ids=lambda s: getattr(s, "backend", "") or s.points
+)
 every = pytest.mark.parametrize("solver", ALL, ids=repr)
 
 

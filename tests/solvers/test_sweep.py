@@ -6,12 +6,22 @@ import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, Family, arm_cases
 from ocp import Solution, Solver, Status, evaluate, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton, polish
+from solvers import (
+    Collocation,
+    IndirectShooting,
+    MultipleShooting,
+    Schuetz,
+    StagewiseNewton,
+    polish,
+)
 from tests.tolerances import BELOW, GAP, VIOLATION
 
 SOLVERS: tuple[tuple[Family, Solver], ...] = (
     ("direct", MultipleShooting()),
     ("direct", MultipleShooting(backend="fatrop")),
+    # 3 divides 24 as it divides 75: the ends of Bryson-Denham's arc are edges.
+    ("direct", Collocation(24)),
+    ("direct", Collocation(24, points="gauss")),
     ("gradient", Schuetz.sound()),
     ("gradient", StagewiseNewton()),
     ("indirect", IndirectShooting(segments=1)),
@@ -67,6 +77,7 @@ def label_of(solver: Solver) -> str:
         repr(solver).split("(")[0]
         + (f"-{solver.segments}" if isinstance(solver, IndirectShooting) else "")
         + ("-fatrop" if "fatrop" in repr(solver) else "")
+        + (f"-{solver.points}" if isinstance(solver, Collocation) else "")
     )
 
 
@@ -85,6 +96,8 @@ def test_solver_on_case(case: Case, family: Family, solver: Solver) -> None:
             pytest.skip(reason)
     if isinstance(solver, MultipleShooting) and case.name in INTERVALS:
         solver = MultipleShooting(INTERVALS[case.name], backend=solver.backend)
+    if isinstance(solver, Collocation) and case.name in INTERVALS:
+        solver = Collocation(INTERVALS[case.name] // 4, points=solver.points)
     guess = start_of(case) if family == "indirect" else None
     judge(case, family, solve(case.build(), solver, guess=guess))
 

@@ -1,6 +1,7 @@
 """Nonlinear oscillators, and a stiff problem, with reference optima."""
 
 import casadi as ca
+import numpy as np
 
 from ocp import OCP, Constraint, Model
 
@@ -47,6 +48,30 @@ def rayleigh() -> OCP:
         x0=[-5.0, -5.0],
         horizon=2.5,
         running_cost=u**2 + x[0] ** 2,
+    )
+
+
+def rayleigh_constrained() -> OCP:
+    r"""Calm the Rayleigh oscillator in 4.5 s, with a constraint on state and control.
+
+    .. math::
+
+        \min \int_0^{4.5} u^2 + x_1^2 \, dt, \quad \dot x_1 = x_2, \;
+        \dot x_2 = -x_1 + x_2 (1.4 - 0.14 x_2^2) + 4 u, \; u + x_1/6 \le 0, \quad
+        x(0) = (-5, -5)
+
+    Reference optimum: 44.80444; the constraint acts on three arcs. Problem: [Maurer & Augustin
+    2001], [Betts 2010, example 4.10].
+    """
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    rate = ca.vertcat(x[1], -x[0] + x[1] * (1.4 - 0.14 * x[1] ** 2) + 4.0 * u)
+    return OCP(
+        name="Rayleigh, constrained",
+        model=Model(name="Rayleigh oscillator", x=x, u=u, f=rate),
+        x0=[-5.0, -5.0],
+        horizon=4.5,
+        running_cost=u**2 + x[0] ** 2,
+        constraints=(Constraint("mixed", u + x[0] / 6.0, -np.inf, 0.0),),
     )
 
 

@@ -1,10 +1,10 @@
 """The double integrator: problems whose optimum is known in closed form."""
 
 import casadi as ca
-import numpy as np
 
 from models._numbers import at_least
-from ocp import OCP, Box, Constraint, FreeTime, Model, ProblemError
+from models.textbook.ends import ends_at
+from ocp import OCP, Box, FreeTime, Model, ProblemError
 
 
 def _model(dt: float | None = None) -> Model:
@@ -21,11 +21,6 @@ def _model(dt: float | None = None) -> Model:
         x_units=("m", "m/s"),
         u_units=("m/s^2",),
     )
-
-
-def _ends_at(model: Model, position: float, velocity: float) -> tuple[Constraint, ...]:
-    target = [position, velocity]
-    return (Constraint("end", model.x, target, target, at="terminal"),)
 
 
 def double_integrator_energy() -> OCP:
@@ -45,7 +40,7 @@ def double_integrator_energy() -> OCP:
         x0=[0.0, 0.0],
         horizon=1.0,
         running_cost=model.u**2 / 2,
-        constraints=_ends_at(model, 1.0, 0.0),
+        constraints=ends_at(model.x, [1.0, 0.0]),
     )
 
 
@@ -68,30 +63,85 @@ def double_integrator_minimum_time() -> OCP:
         horizon=FreeTime(guess=1.0, lower=0.1, upper=10.0),
         running_cost=1.0,
         control_bounds=Box(-1.0, 1.0),
-        constraints=_ends_at(model, 1.0, 0.0),
+        constraints=ends_at(model.x, [1.0, 0.0]),
     )
 
 
-def bryson_denham() -> OCP:
-    r"""Turn round within 1/9 m, with least energy: a state constraint that gets active.
+def double_integrator_bounded_energy() -> OCP:
+    r"""The same motion with least energy and an acceleration that is bounded.
 
     .. math::
 
-        \min \int_0^1 u^2/2 \, dt, \quad \ddot x = u, \; x \le l = 1/9, \quad
-        (x, \dot x): (0, 1) \to (0, -1)
+        \min \int_0^1 u^2/2 \, dt, \quad \ddot x = u, \; |u| \le 5, \quad
+        (x, \dot x): (0, 0) \to (1, 0)
 
-    Optimum: cost 4 / (9 l) = 4 exactly, with u* = -2/(3l) (1 - t/(3l)) up to t = 3 l = 1/3,
-    0 on the boundary, and symmetric [Bryson & Ho 1975, section 3.11].
+    Optimum: 25/2 - (50/3) √(3/20) = 6.045028 exactly. u is 5 s/w clipped to ±5 with the
+    time s = 1/2 - t left to the middle: the way is 2∫ s u ds over (0, 1/2) = 10 (1/8 - w²/6) = 1,
+    so w² = 3/20; the cost is 25 (1/2 - 2w/3). Costates (-5/w, -5/(2w)).
     """
     model = _model()
     return OCP(
-        name="Bryson-Denham",
+        name="double integrator, bounded energy",
         model=model,
-        x0=[0.0, 1.0],
+        x0=[0.0, 0.0],
         horizon=1.0,
         running_cost=model.u**2 / 2,
-        state_bounds=Box([-np.inf, -np.inf], [1.0 / 9.0, np.inf]),
-        constraints=_ends_at(model, 0.0, -1.0),
+        control_bounds=Box(-5.0, 5.0),
+        constraints=ends_at(model.x, [1.0, 0.0]),
+    )
+
+
+def double_integrator_fuel() -> OCP:
+    r"""The same motion with least fuel: push, coast, brake.
+
+    .. math::
+
+        \min \int_0^1 u_+ + u_- \, dt, \quad \ddot x = u_+ - u_-, \; 0 \le u_\pm \le 5, \quad
+        (x, \dot x): (0, 0) \to (1, 0)
+
+    Optimum: 5 - √5 = 2.763932 exactly: pushes of 5 m/s² for τ at both ends move by 5τ(1 - τ) = 1,
+    so τ = (1 - 1/√5)/2, and the cost is 10τ.
+    """
+    x, v = ca.SX.sym("position"), ca.SX.sym("velocity")
+    push = ca.vertcat(ca.SX.sym("forward"), ca.SX.sym("backward"))
+    model = Model(
+        name="double integrator with two thrusters",
+        x=ca.vertcat(x, v),
+        u=push,
+        f=ca.vertcat(v, push[0] - push[1]),
+        x_units=("m", "m/s"),
+        u_units=("m/s^2", "m/s^2"),
+    )
+    return OCP(
+        name="double integrator, fuel",
+        model=model,
+        x0=[0.0, 0.0],
+        horizon=1.0,
+        running_cost=push[0] + push[1],
+        control_bounds=Box(0.0, 5.0),
+        constraints=ends_at(model.x, [1.0, 0.0]),
+    )
+
+
+def double_integrator_distance() -> OCP:
+    r"""Get far with little energy; the end is free.
+
+    .. math::
+
+        \min -\tfrac12 x(1) + \tfrac12 \int_0^1 u^2 \, dt, \quad \ddot x = u, \quad
+        (x, \dot x)(0) = (0, 0)
+
+    Optimum: -1/24 exactly, with u = (1 - t)/2: the push at t moves x(1) by 1 - t. Costates
+    (-1/2, -(1 - t)/2).
+    """
+    model = _model()
+    return OCP(
+        name="double integrator, distance",
+        model=model,
+        x0=[0.0, 0.0],
+        horizon=1.0,
+        running_cost=model.u**2 / 2,
+        terminal_cost=-model.x[0] / 2,
     )
 
 

@@ -1,0 +1,69 @@
+"""How a case of the library is written down."""
+
+from collections.abc import Callable
+
+from benchmarks.cases.case import Case, Difficulty, Family, Published, Reference
+from ocp import OCP
+
+SUITE = "library"
+# What suits a smooth problem: with given ends, and with free ones.
+SMOOTH: tuple[Family, ...] = ("direct", "indirect", "polish")
+FREE_END: tuple[Family, ...] = (*SMOOTH, "gradient")
+DIRECT: tuple[Family, ...] = ("direct",)
+# A state constraint: once at the nodes, once between them too.
+BETWEEN: tuple[Family, ...] = ("direct", "between")
+
+BONNANS = "[Bonnans et al. 2017]"
+DOLAN = "[Dolan, More & Munson 2004]"
+RUTQUIST = "[Rutquist & Edvall 2010]"
+
+# Closed forms are evaluated in double precision; roots of equations are printed with 12 digits.
+_ROUNDING, _PRINTED = 1e-14, 1e-12
+
+
+def entry(
+    build: Callable[[], OCP],
+    name: str,
+    reference: Reference,
+    families: tuple[Family, ...],
+    difficulty: Difficulty,
+    source: str,
+    *,
+    published: tuple[Published, ...] = (),
+    costate0: tuple[float, ...] | None = None,
+    local_costs: tuple[float, ...] = (),
+) -> Case:
+    """Return a case of the suite ``library``; see ``Case``."""
+    return Case(
+        name=name,
+        suite=SUITE,
+        build=build,
+        source=source,
+        reference=reference,
+        difficulty=difficulty,
+        families=frozenset(families),
+        published=published,
+        costate0=costate0,
+        local_costs=local_costs,
+    )
+
+
+def closed(value: float, formula: str) -> Reference:
+    """Return a reference that is a formula."""
+    return Reference(float(value), _ROUNDING * abs(value), f"closed form: {formula}")
+
+
+def root(value: float, equations: str) -> Reference:
+    """Return a closed form up to the root of one or two equations."""
+    return Reference(value, _PRINTED * max(1.0, abs(value)), f"closed form: {equations}")
+
+
+def certified(value: float, error: float, how: str) -> Reference:
+    """Return a computed reference.
+
+    Args:
+        value: the best estimate.
+        error: absolute; the optimum lies within it as far as the methods that are named tell.
+        how: which methods.
+    """
+    return Reference(value, error, f"computed: {how}")

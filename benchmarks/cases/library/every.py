@@ -1,0 +1,29 @@
+"""All cases of the library, in the order of its page."""
+
+from benchmarks.cases.case import Case
+from benchmarks.cases.library.chapter_2 import CHAPTER_2
+from benchmarks.cases.library.closed_forms import CLOSED_FORMS
+from benchmarks.cases.library.robots import ROBOTS
+from benchmarks.cases.library.smooth import SMOOTH_PROBLEMS
+from benchmarks.cases.library.state_constraints import STATE_CONSTRAINTS
+from benchmarks.cases.library.switching import SWITCHING
+
+LIBRARY: tuple[Case, ...] = (
+    *CLOSED_FORMS,
+    *SMOOTH_PROBLEMS,
+    *SWITCHING,
+    *STATE_CONSTRAINTS,
+    *ROBOTS,
+    *CHAPTER_2,
+)
+
+_SIX = {
+    "double-integrator-energy",
+    "double-integrator-minimum-time",
+    "bryson-denham",
+    "van-der-pol",
+    "rayleigh",
+    "hypersensitive",
+}
+# The six that every solver is tested on.
+TEXTBOOK: tuple[Case, ...] = tuple(case for case in LIBRARY if case.name in _SIX)

@@ -1,0 +1,116 @@
+"""Smooth nonlinear problems."""
+
+from benchmarks.cases.case import Published
+from benchmarks.cases.library.entry import (
+    BONNANS,
+    DOLAN,
+    FREE_END,
+    RUTQUIST,
+    SMOOTH,
+    certified,
+    entry,
+    root,
+)
+from models import (
+    brachistochrone,
+    electric_vehicle,
+    hanging_chain,
+    hypersensitive,
+    isoperimetric,
+    linear_tangent_steering,
+    pendulum_swing_up,
+    rayleigh,
+    van_der_pol,
+    zermelo,
+)
+
+_POLISHED = "polished from direct, steps doubled until 1e-10"
+
+SMOOTH_PROBLEMS = (
+    entry(
+        van_der_pol,
+        "van-der-pol",
+        certified(1.047806908220, 1e-11, _POLISHED),
+        FREE_END,
+        "smooth",
+        BONNANS,
+        published=(Published(1.047921, BONNANS),),
+    ),
+    entry(
+        rayleigh,
+        "rayleigh",
+        certified(29.376079655945, 1e-10, _POLISHED),
+        FREE_END,
+        "smooth",
+        "[Maurer & Augustin 2001]",
+    ),
+    entry(
+        hypersensitive,
+        "hypersensitive",
+        certified(1.330806904945, 2e-11, _POLISHED),
+        ("direct", "polish"),
+        "long",
+        "[Rao & Mease 2000]",
+    ),
+    entry(
+        pendulum_swing_up,
+        "pendulum-swing-up",
+        certified(0.580559833252, 1e-10, f"{_POLISHED}; best of 16 starts"),
+        SMOOTH,
+        "nonconvex",
+        "made for this library",
+        local_costs=(0.588575, 30.847204),
+    ),
+    entry(
+        zermelo,
+        "zermelo",
+        root(5.457865263561, "two equations for the headings at both ends"),
+        ("direct",),
+        "smooth",
+        "[Bryson & Ho 1975, section 2.7, example 1]",
+        published=(Published(5.46, "[Bryson & Ho 1975, section 2.7, example 1]"),),
+    ),
+    entry(
+        brachistochrone,
+        "brachistochrone",
+        root(0.824759143157, "cycloid through the end, φ - sin φ = 1 - cos φ"),
+        ("direct", "indirect"),
+        "smooth",
+        "[Bryson & Ho 1975, section 2.7]",
+    ),
+    entry(
+        linear_tangent_steering,
+        "linear-tangent-steering",
+        root(0.554570878335, "two equations for the first angle and the time"),
+        ("direct", "indirect"),
+        "smooth",
+        DOLAN,
+    ),
+    entry(
+        hanging_chain,
+        "hanging-chain",
+        root(5.068480110993, "catenary of the given length"),
+        ("direct", "indirect"),
+        "smooth",
+        DOLAN,
+        published=(Published(5.068480111, RUTQUIST),),
+    ),
+    entry(
+        isoperimetric,
+        "isoperimetric",
+        certified(-0.37550377, 6e-8, f"{_POLISHED}, the bound as a clipped minimiser"),
+        ("direct", "indirect"),
+        "smooth",
+        RUTQUIST,
+        published=(Published(-0.375495523, RUTQUIST),),
+    ),
+    entry(
+        electric_vehicle,
+        "electric-vehicle",
+        certified(1228580.28988877, 1e-5, _POLISHED),
+        SMOOTH,
+        "smooth",
+        "[Petit & Sciarretta 2011]",
+        published=(Published(1.23e6, BONNANS),),
+    ),
+)

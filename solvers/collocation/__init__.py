@@ -1,0 +1,1 @@
+"""Direct collocation: states and controls as polynomials, the dynamics met at points of theirs."""

@@ -1,0 +1,216 @@
+"""Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp import (
+    OCP,
+    Data,
+    ProblemError,
+    Program,
+    Solution,
+    Solver,
+    Start,
+    UnsupportedProblem,
+    elevated,
+    instance,
+)
+from solvers.collocation.costates import costates
+from solvers.collocation.gaps import Gaps
+from solvers.collocation.mesh import Grid, Mesh
+from solvers.collocation.points import Family, Points
+from solvers.collocation.transcription import Collocated, Unknowns
+from solvers.direct.backend import Answer, Backend
+from solvers.direct.search import Found, Search
+
+
+@dataclass(frozen=True)
+class Collocation(Solver):
+    r"""States and controls as polynomials on each interval, the dynamics met at points of theirs.
+
+    With d points an interval states have degree d and controls d - 1, continuous states and
+    discontinuous controls. On smooth problems states, costates and cost at the interval ends
+    are of order 2d - 1 (Radau) and 2d (Gauss) in the interval's length.
+
+    What holds where: dynamics, path constraints and state bounds at the collocation points, which
+    are inside the intervals and with Radau their ends as well. So with Gauss' the final state is
+    bound by terminal constraints alone, and with neither does a path constraint with the control
+    hold at t0. A start that is given and violates a path constraint is ``INFEASIBLE``; one
+    that is free obeys state bounds and path constraints without control. Bounds of the control
+    hold everywhere: it is a combination, convex at each instant, of coefficients within them.
+    Signals are read at the points; where they have kinks or jumps, let edges be.
+
+    Source: [Hager 2000; Benson et al. 2006; Garg et al. 2010]; backend [Waechter & Biegler 2006].
+
+    Args:
+        intervals: number of equal intervals.
+        degree: points an interval, d, 2 to 5.
+        points: ``"radau"``: the end of each interval is a point, damps what is stiff; or
+            ``"gauss"``: one order more, symmetric in time.
+        mesh: intervals of any lengths and degrees, instead of ``intervals`` and ``degree``.
+        tolerance: of the optimality conditions.
+        max_iterations: limit of the backend.
+        accuracy: largest accepted error of a state, relative to 1 + abs(x): by how much the
+            dynamics, integrated from node to node, miss the polynomial; an answer beyond it is
+            ``INACCURATE``. ``refined`` finds a mesh that meets it.
+        verbose: let the backend print.
+    """
+
+    intervals: int = 25
+    degree: int = 4
+    points: Family = "radau"
+    mesh: Mesh | None = None
+    tolerance: float = 1e-9
+    max_iterations: int = 300
+    accuracy: float = 1e-2
+    verbose: bool = False
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        Points.of(self.points, self.degree)
+        if self.mesh is not None:
+            instance(self.mesh, Mesh, "collocation: mesh")
+        self.chosen_mesh  # noqa: B018 - checks its own
+        if not self.accuracy > 0.0:
+            raise ProblemError(f"the accuracy must be positive, not {self.accuracy}")
+        self.options  # noqa: B018 - checks its own
+
+    @property
+    def chosen_mesh(self) -> Mesh:
+        """The mesh, given or uniform."""
+        return self.mesh or Mesh.uniform(self.intervals, self.degree)
+
+    @property
+    def options(self) -> Backend:
+        """The backend with its options."""
+        return Backend("ipopt", self.tolerance, self.max_iterations, self.verbose)
+
+    def build(self, ocp: OCP) -> "CollocationProgram":
+        """Transcribe the problem and set the backend up.
+
+        Raises:
+            UnsupportedProblem: for a discrete-time model, which has nothing to collocate.
+        """
+        if ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
+            )
+        grid = Grid.of(self.chosen_mesh, self.points)
+        program = CollocationProgram(self, Collocated(ocp, grid), Gaps.of(ocp, grid))
+        program.search.nlp  # noqa: B018 - all symbolic work is done here
+        return program
+
+
+@dataclass(frozen=True, eq=False)
+class CollocationProgram(Program):
+    """A collocated problem with its backend.
+
+    Attributes:
+        solver: the options.
+        transcription: the problem on its points.
+        gaps: the dynamics between the nodes.
+    """
+
+    solver: Collocation
+    transcription: Collocated
+    gaps: Gaps
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        """Solve for these data; where that fails, look for a trajectory that is feasible."""
+        started, ocp = perf_counter(), self.transcription.ocp
+        data = Data.of(ocp, x0, t0, parameters)
+        first = self._first_iterate(data, guess or ocp.guess)
+        found = self.search.solve(first.joined(), data)
+        return self._solution(data, found, perf_counter() - started)
+
+    @cached_property
+    def search(self) -> Search:
+        """The backend, and what is done around it."""
+        solver = self.solver
+        return Search(self.transcription, solver.options, solver.accuracy, self._error)
+
+    # -- the first iterate -------------------------------------------------------------------
+
+    def _first_iterate(self, data: Data, guess: Start | None) -> Unknowns:
+        """States and controls of the guess; without states, the controls' own roll-out."""
+        grid, ocp = self.transcription.grid, self.transcription.ocp
+        m = ocp.model
+        at_points = guess.sample("u", grid.at, m.nu) if guess else None
+        u = np.zeros((len(grid.at), m.nu)) if at_points is None else at_points
+        c = ocp.control_bounds.clip(self._coefficients(u))
+        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
+        x = guess.sample("x", grid.nodes, m.nx) if guess else None
+        if x is None:
+            x = self.gaps.rollout(self._elevated(c), duration, data)
+        if not np.isfinite(x).all():
+            x = np.tile(data.x0, (len(grid.nodes), 1))
+        z = x[grid.edge_nodes].T
+        z = np.vstack([z, np.full((1, z.shape[1]), duration)]) if ocp.has_free_time else z
+        return Unknowns(z, c.T, x[grid.point_nodes].T)
+
+    def _coefficients(self, u: np.ndarray) -> np.ndarray:
+        """Bernstein coefficients of controls at the points, (M, nu) both."""
+        grid = self.transcription.grid
+        return np.vstack(
+            [np.linalg.solve(p.B, u[grid.owner == k]) for k, p in enumerate(grid.points)]
+        )
+
+    def _elevated(self, c: np.ndarray) -> np.ndarray:
+        """Coefficients (M, nu) of any degrees as those of the highest one, interval by interval."""
+        grid = self.transcription.grid
+        most = max(grid.mesh.degrees)
+        parts = [elevated(c[grid.owner == k], most) for k in range(grid.mesh.intervals)]
+        return np.vstack(parts)
+
+    # -- the answer --------------------------------------------------------------------------
+
+    def _error(self, answer: Answer, data: Data) -> tuple[float, int]:
+        w, tr = answer.w, self.transcription
+        u = self._elevated(tr.split(w).c.T)
+        moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
+        worst = int(moved.argmax())
+        return float(moved[worst]), worst + 1
+
+    def _states(self, w: np.ndarray) -> np.ndarray:
+        """States at all nodes, (N + 1, nx)."""
+        tr, grid = self.transcription, self.transcription.grid
+        parts, nx = tr.split(w), tr.ocp.model.nx
+        x = np.empty((len(grid.nodes), nx))
+        x[grid.edge_nodes] = parts.z[:nx].T
+        x[grid.point_nodes] = parts.x.T  # within the state bounds, at the edges as well
+        return x
+
+    def _solution(self, data: Data, found: Found, seconds: float) -> Solution:
+        tr, answer = self.transcription, found.last
+        return Solution(
+            problem=tr.ocp,
+            solver=repr(self.solver),
+            status=found.status,
+            message=found.message,
+            t=self.search.times(answer, data),
+            x=self._states(answer.w),
+            x0=data.x0,
+            costate=costates(tr, answer.lam_g),
+            u=self._elevated(tr.split(answer.w).c.T),
+            control_kind="polynomial",
+            breaks=tr.grid.edge_nodes,
+            cost=answer.cost,
+            residual=found.residual,
+            iterations=found.iterations,
+            work=found.work,
+            history=found.history(),
+            parameters=data.values.as_dict(),
+            solve_time=seconds,
+        )

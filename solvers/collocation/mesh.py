@@ -1,0 +1,100 @@
+"""Where the pieces of a collocated trajectory meet, and of which degree each is."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ocp import ProblemError, whole
+from solvers.collocation.points import Family, Points
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Intervals of any lengths, each with a degree of its own.
+
+    Args:
+        edges: fractions of the horizon, from 0 to 1, (K + 1,).
+        degrees: 2 to 5 for each interval, (K,).
+
+    Raises:
+        ProblemError: if the edges do not increase from 0 to 1 or a degree is missing or outside.
+    """
+
+    edges: tuple[float, ...]
+    degrees: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Check both, and keep them as tuples."""
+        edges, degrees = tuple(map(float, self.edges)), tuple(self.degrees)
+        if len(edges) < 2 or edges[0] != 0.0 or edges[-1] != 1.0 or not min(np.diff(edges)) > 0.0:
+            raise ProblemError("mesh: the edges must increase from 0 to 1")
+        if len(degrees) != len(edges) - 1:
+            raise ProblemError(f"mesh: {len(degrees)} degrees for {len(edges) - 1} intervals")
+        for degree in degrees:
+            Points.of("radau", degree)
+        object.__setattr__(self, "edges", edges)
+        object.__setattr__(self, "degrees", degrees)
+
+    @classmethod
+    def uniform(cls, intervals: int, degree: int) -> "Mesh":
+        """Return equal intervals of one degree."""
+        whole(intervals, "mesh: intervals")
+        return cls(tuple(np.linspace(0.0, 1.0, intervals + 1)), (degree,) * intervals)
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals K."""
+        return len(self.degrees)
+
+    @property
+    def widths(self) -> np.ndarray:
+        """Lengths as fractions of the horizon, (K,)."""
+        return np.diff(self.edges)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A mesh with its collocation points: M of them, on all intervals.
+
+    Attributes:
+        mesh: the intervals.
+        points: the points of each interval.
+    """
+
+    mesh: Mesh
+    points: tuple[Points, ...]
+
+    @classmethod
+    def of(cls, mesh: Mesh, family: Family) -> "Grid":
+        """Put the points of a family on a mesh."""
+        return cls(mesh, tuple(Points.of(family, degree) for degree in mesh.degrees))
+
+    @cached_property
+    def owner(self) -> np.ndarray:
+        """The interval of each point, (M,)."""
+        return np.repeat(np.arange(self.mesh.intervals), self.mesh.degrees)
+
+    @cached_property
+    def at(self) -> np.ndarray:
+        """Points as fractions of the horizon, (M,)."""
+        edges = np.asarray(self.mesh.edges)
+        inside = np.concatenate([p.c for p in self.points])
+        # The last point of Radau is the edge itself, not almost.
+        exact = edges[self.owner] + inside * self.mesh.widths[self.owner]
+        return np.where(inside == 1.0, edges[self.owner + 1], exact)
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """Edges and points together, as fractions of the horizon, (N + 1,)."""
+        return np.unique(np.concatenate([self.mesh.edges, self.at]))
+
+    @cached_property
+    def edge_nodes(self) -> np.ndarray:
+        """Which nodes the edges are, (K + 1,)."""
+        return np.searchsorted(self.nodes, self.mesh.edges)
+
+    @cached_property
+    def point_nodes(self) -> np.ndarray:
+        """Which nodes the points are, (M,)."""
+        return np.searchsorted(self.nodes, self.at)
