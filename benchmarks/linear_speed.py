@@ -1,4 +1,4 @@
-"""What a step of linear control costs: over the horizon, and beside qpmpc.
+"""What a step of linear control costs over the horizon.
 
 Times are processor times of this process, so that other programs of the machine do not count;
 what matters are exponents and ratios of one run.
@@ -7,7 +7,6 @@ what matters are exponents and ratios of one run.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import process_time
-from typing import Literal
 
 import numpy as np
 
@@ -21,8 +20,6 @@ FITTED_FROM = 50
 PEER_HORIZON = 20
 DT, BOUND, FORCE = 0.05, 2.0, 40.0
 STATE_WEIGHT, INPUT_WEIGHT, END_WEIGHT = 100.0, 0.5, 100.0
-Form = Literal["sparse", "condensed"]
-FORMS: tuple[Form, ...] = ("sparse", "condensed")
 # A method that takes longer than this for one step is not measured at longer horizons [s].
 _PATIENCE = 2.0
 
@@ -51,29 +48,8 @@ class Growth:
         return float(np.polyfit(n, t, 1)[0])
 
 
-@dataclass(frozen=True)
-class Pair:
-    """Steps of LinearMPC and of a peer on the same problem, taken in turns.
-
-    Attributes:
-        backend: of both.
-        form: of LinearMPC.
-        ours: median [s].
-        theirs: median [s].
-        ratio: median of the ratios of the pairs.
-        apart: largest difference of the first inputs.
-    """
-
-    backend: str
-    form: Form
-    ours: float
-    theirs: float
-    ratio: float
-    apart: float
-
-
 def mass_tracking(steps: int) -> OCP:
-    """Return the problem of (2.92) to (2.94) with the weights that qpmpc can state: numbers."""
+    """Return the problem of (2.92) to (2.94) with weights that every peer can state: numbers."""
     return tracking_ocp(
         mass_spring_damper().sampled(DT),
         sinusoid(DT * np.arange(steps + 1)),
@@ -168,37 +144,3 @@ def feedback_law_time(steps: int, count: int = 1000) -> float:
     for _ in range(count):
         _ = -gain @ x
     return (process_time() - started) / count
-
-
-def peer_pairs(backends: Sequence[str], count: int = 80) -> list[Pair] | None:
-    """Measure steps of LinearMPC and of qpmpc in turns; None if qpmpc is not installed."""
-    try:
-        from benchmarks.qpmpc_peer import QpmpcStep
-    except ModuleNotFoundError as missing:
-        if missing.name != "qpmpc":
-            raise
-        return None
-    seen = situations(PEER_HORIZON, count)
-    return [
-        _pair(backend, form, QpmpcStep(PEER_HORIZON, backend), seen)
-        for backend in backends
-        for form in FORMS
-    ]
-
-
-def _pair(
-    backend: str, form: Form, peer: Callable[[Situation], float], seen: Sequence[Situation]
-) -> Pair:
-    program = LinearMPC(backend=backend, form=form).build(mass_tracking(PEER_HORIZON))
-    ours, theirs, apart = [], [], []
-    for now in (seen[0], *seen):
-        began = process_time()
-        plan = program.run(x0=now.x, t0=now.t, parameters={"reference": now.ahead})
-        between = process_time()
-        first = peer(now)
-        theirs.append(process_time() - between)
-        ours.append(between - began)
-        apart.append(abs(float(plan.or_raise().u[0, 0]) - first))
-    mine, other = np.array(ours[1:]), np.array(theirs[1:])
-    ratio = float(np.median(mine / other))
-    return Pair(backend, form, float(np.median(mine)), float(np.median(other)), ratio, max(apart))

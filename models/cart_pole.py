@@ -109,7 +109,7 @@ def cart_pole_swing_up(
     The defaults are the problem of [Kelly 2017], section 6 and appendix E.1.
 
     Reference optimum: 58.807667458, by ``polish`` to 1e-10, without the track: no bound is
-    active, |u| <= 14.0 N and p <= 1.18 m. Multiple shooting holds its forces and costs
+    active, ``|u|`` <= 14.0 N and p <= 1.18 m. Multiple shooting holds its forces and costs
     59.132, 58.888, 58.828 and 58.813 on 50, 100, 200 and 400 intervals, which extrapolates
     to 58.807667.
 
@@ -162,7 +162,7 @@ def cart_pole_upright(
     Where the track is a hard bound, an optimal cart runs along it, and the smallest error of
     the model then leaves it no way back: no force stops it at once. With a cushion the price
     w alone keeps the cart away, which also serves solvers that take no state bounds:
-    |p| <= p_max is then no bound of the problem any more. The second derivative jumps, so
+    ``|p|`` <= p_max is then no bound of the problem any more. The second derivative jumps, so
     that the smoothness is 1.
 
     Args:

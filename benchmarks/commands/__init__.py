@@ -8,6 +8,7 @@ from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
+from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.run import RUN
 from benchmarks.commands.speed import ARM_SPEED, SPEED
@@ -26,6 +27,7 @@ COMMANDS: tuple[Command, ...] = (
     MPC,
     FAULTS,
     MISTAKES_COMMAND,
+    PEERS_COMMAND,
 )
 
 __all__ = ["COMMANDS", "Command"]

@@ -33,7 +33,5 @@ def _arm(options: Namespace, console: Console) -> int:
     return 0
 
 
-SPEED = Command(
-    "speed", "linear control: a step over N, and beside qpmpc", _linear_options, _linear
-)
+SPEED = Command("speed", "linear control: a step over N", _linear_options, _linear)
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)

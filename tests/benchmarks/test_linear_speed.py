@@ -1,21 +1,16 @@
 """The commands that measure linear and greedy control."""
 
-import sys
-
 import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.greedy_gap import PROBLEMS, gap
-from benchmarks.linear_speed import Growth, peer_pairs, situations
+from benchmarks.linear_speed import Growth, situations
 
 
-def test_speed_prints_growth_and_says_that_the_peer_is_missing(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "qpmpc", None)
-    monkeypatch.delitem(sys.modules, "benchmarks.qpmpc_peer", raising=False)
+def test_speed_prints_growth(capsys):
     assert main(["speed", "--horizons", "5", "10", "--count", "3"]) == 0
     shown = capsys.readouterr().out
-    assert "qpmpc is not installed" in shown
     for method in ("LinearMPC, sparse", "LinearMPC, condensed", "Riccati", "Batch"):
         assert method in shown
 
@@ -32,13 +27,6 @@ def test_exponent_is_the_slope_of_the_long_horizons():
     line = Growth("m", (10, 50, 100, 200), (9.0, 0.5, 1.0, 2.0))
     assert line.exponent == pytest.approx(1.0)
     assert Growth("m", (10, 50), (1.0, 2.0)).exponent is None
-
-
-def test_both_answer_the_same_problem():
-    pytest.importorskip("qpmpc")
-    pairs = peer_pairs(("quadprog",), count=5) or []
-    assert [p.form for p in pairs] == ["sparse", "condensed"]
-    assert max(p.apart for p in pairs) < 1e-8
 
 
 # Measured once, by this command.

@@ -18,18 +18,28 @@ from solvers.certify.grid_conditions import grid_checks
 LIMIT = 1e-6
 
 
-def integrator(**changes) -> OCP:
-    """x' = u from 1, int u^2 over 1 s, x(1) = 0: u = -1."""
+def integrator(
+    running=lambda x, u: u**2,
+    ends=lambda x: (Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    control_bounds=None,
+    horizon: float | FreeTime = 1.0,
+) -> OCP:
+    """x' = u from 1 in 1 s; as it stands, int u^2 with x(1) = 0: u = -1."""
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    parts = {
-        "name": "integrator",
-        "model": Model(name="integrator", x=x, u=u, f=u),
-        "x0": [1.0],
-        "horizon": 1.0,
-        "running_cost": u**2,
-        "constraints": (Constraint("end", x, 0.0, 0.0, at="terminal"),),
-    }
-    return OCP(**(parts | {k: v(x, u) if callable(v) else v for k, v in changes.items()}))
+    return OCP(
+        name="integrator",
+        model=Model(name="integrator", x=x, u=u, f=u),
+        x0=[1.0],
+        horizon=horizon,
+        running_cost=running(x, u),
+        constraints=ends(x),
+        control_bounds=control_bounds or Box(),
+    )
+
+
+def free(x):
+    """No constraint at the end."""
+    return ()
 
 
 def direct(ocp: OCP, intervals: int = 20):
@@ -84,7 +94,7 @@ def test_time_in_the_problem_is_taken_off():
         name="aging",
         model=Model(name="aging", x=x, u=u, t=t, f=u),
         x0=[1.0],
-        horizon=1.0,
+        horizon: float | FreeTime = 1.0,
         running_cost=(1 + t) * u**2,
         constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
     )
@@ -95,7 +105,7 @@ def test_time_in_the_problem_is_taken_off():
 
 
 def test_at_a_free_final_time_the_hamiltonian_is_zero():
-    ocp = integrator(horizon=FreeTime(1.0, 0.1, 10.0), running_cost=lambda x, u: 1 + u**2)
+    ocp = integrator(horizon=FreeTime(1.0, 0.1, 10.0), running=lambda x, u: 1 + u**2)
     extremal = polish(direct(ocp))
     assert extremal.duration == pytest.approx(1.0, abs=1e-8)
     assert hamiltonian_check(extremal, LIMIT).verdict is Verdict.HOLDS
@@ -138,13 +148,13 @@ def test_a_trajectory_that_is_not_optimal_is_seen():
 
 def test_a_multiplier_of_the_wrong_sign_is_named():
     """Held at its bound against the slope of the cost."""
-    free = integrator(constraints=(), running_cost=lambda x, u: x**2 + u**2)
+    unbounded = integrator(ends=free, running=lambda x, u: x**2 + u**2)
     bounded = integrator(
-        constraints=(),
-        running_cost=lambda x, u: x**2 + u**2,
+        ends=free,
+        running=lambda x, u: x**2 + u**2,
         control_bounds=Box([-10.0], [0.5]),
     )
-    best = direct(free)
+    best = direct(unbounded)
     u = np.full_like(best.u, 0.5)
     x = np.concatenate([[1.0], 1.0 + np.cumsum(u[:, 0]) / len(u)])[:, None]
     check = grid_checks(best.with_(problem=bounded, u=u, x=x))[1]
@@ -154,7 +164,7 @@ def test_a_multiplier_of_the_wrong_sign_is_named():
 
 def test_a_constraint_written_twice_fails_licq_but_not_optimality():
     twice = integrator(
-        constraints=lambda x, u: (
+        ends=lambda x: (
             Constraint("end", x, 0.0, 0.0, at="terminal"),
             Constraint("end again", 2 * x, 0.0, 0.0, at="terminal"),
         )
@@ -168,7 +178,7 @@ def test_a_constraint_written_twice_fails_licq_but_not_optimality():
 
 def test_a_maximum_curves_the_wrong_way():
     """u = 0 is a stationary point of -u^2/2 + u^4/4, and a maximum."""
-    ocp = integrator(constraints=(), running_cost=lambda x, u: -(u**2) / 2 + u**4 / 4)
+    ocp = integrator(ends=free, running=lambda x, u: -(u**2) / 2 + u**4 / 4)
     best = direct(ocp)
     still = best.with_(u=np.zeros_like(best.u), x=np.ones_like(best.x))
     _, multipliers, curvature = grid_checks(still)

@@ -3,6 +3,7 @@
 from benchmarks.cases.case import Published
 from benchmarks.cases.library.entry import (
     BONNANS,
+    DIRECT,
     DOLAN,
     FREE_END,
     RUTQUIST,
@@ -13,6 +14,7 @@ from benchmarks.cases.library.entry import (
 )
 from models import (
     brachistochrone,
+    cart_pole_swing_up,
     electric_vehicle,
     hanging_chain,
     hypersensitive,
@@ -60,6 +62,14 @@ SMOOTH_PROBLEMS = (
         "nonconvex",
         "made for this library",
         local_costs=(0.588575, 30.847204),
+    ),
+    entry(
+        cart_pole_swing_up,
+        "cart-pole-swing-up",
+        certified(58.807667458, 1e-8, "polished from direct without the bounds, none is active"),
+        DIRECT,
+        "nonconvex",
+        "[Kelly 2017]",
     ),
     entry(
         zermelo,

@@ -1,0 +1,28 @@
+"""Other packages beside ours, on the same problems: ``python -m benchmarks peers``.
+
+Each peer runs in an environment and a process of its own, spoken to by JSON with a time limit;
+it is told the problem as lists of elementary operations, and our referee judges its controls.
+"""
+
+from benchmarks.peers.compare import compare
+from benchmarks.peers.entry import BadResults, Entry, Report
+from benchmarks.peers.environment import Environment, InstallFailed, NotInstalled
+from benchmarks.peers.jobs import JOBS
+from benchmarks.peers.peer import PEERS, Peer
+from benchmarks.peers.tables import markdown, quicker, tables
+
+__all__ = [
+    "JOBS",
+    "PEERS",
+    "BadResults",
+    "Entry",
+    "Environment",
+    "InstallFailed",
+    "NotInstalled",
+    "Peer",
+    "Report",
+    "compare",
+    "markdown",
+    "quicker",
+    "tables",
+]
