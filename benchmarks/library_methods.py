@@ -7,11 +7,21 @@ from benchmarks.cases import Case, Family
 from benchmarks.library_tolerances import INTERVALS, USUAL
 from benchmarks.method import Method, Outcome, Settings, judged, problem
 from ocp import Solution, Solver, solve
-from solvers import BetweenNodes, IndirectShooting, MultipleShooting, Schuetz, polish
+from solvers import (
+    BetweenNodes,
+    Collocation,
+    IndirectShooting,
+    MultipleShooting,
+    Schuetz,
+    polish,
+    refined,
+)
 
 SUITE = "library"
 # Polished until the cost changes by less, relative to 1 + cost.
 ACCURACY = 1e-10
+# Collocation: the first mesh, with edges where a third and a fourth begin; the accepted defect.
+FIRST_MESH, DEFECT = Collocation(intervals=24), 1e-8
 
 
 def _grids(case: Case) -> tuple[int, int]:
@@ -45,6 +55,10 @@ def _indirect(case: Case, settings: Settings) -> Outcome:
     return judged(solve(problem(case), IndirectShooting(segments=15), guess=_coarse(case)))
 
 
+def _collocation(case: Case, settings: Settings) -> Outcome:
+    return judged(refined(_coarse(case), solver=FIRST_MESH, accuracy=DEFECT).solution)
+
+
 def _extremal(case: Case, settings: Settings) -> Outcome:
     return judged(polish(_coarse(case), accuracy=ACCURACY))
 
@@ -75,6 +89,9 @@ def library_methods() -> tuple[Method, ...]:
         method("direct-coarse", "direct", _direct_coarse, coarse, "own guess"),
         method("direct-fine", "direct", _direct_fine, fine, after),
         method("direct-fatrop", "direct", _on_coarse(_fatrop), fatrop, "own guess"),
+        method(
+            "collocation", "collocation", _collocation, FIRST_MESH, "refined, from direct-coarse"
+        ),
         method("direct-between", "between", _on_coarse(_between), between, "margins, own guess"),
         method("indirect", "indirect", _indirect, shooting, after),
         method("extremal", "polish", _extremal, settings, "direct-coarse made extremal"),

@@ -57,10 +57,24 @@ GRADIENT: dict[Difficulty, Tolerance] = {
     "singular": (2e-5, 1e-12),
 }
 
+# Radau points, the mesh refined until the dynamics hold to 1e-8; what switches or touches a bound
+# within an interval costs it its order.
+COLLOCATION: dict[Difficulty, Tolerance] = {
+    "easy": (1e-9, 1e-8),
+    "smooth": (1e-5, 1e-8),
+    "long": (1e-9, 1e-8),
+    "nonconvex": (1e-9, 1e-7),
+    "bang-bang": (1e-5, 1e-8),
+    "singular": (2e-6, 1e-5),
+    "state-constrained": (5e-6, 2e-6),
+    "mixed-constrained": (1e-6, 2e-3),
+}
+
 TOLERANCES: dict[str, dict[Difficulty, Tolerance]] = {
     "direct-coarse": DIRECT_COARSE,
     "direct-fine": DIRECT_FINE,
     "direct-fatrop": DIRECT_COARSE,
+    "collocation": COLLOCATION,
     "direct-between": BETWEEN,
     "indirect": INDIRECT,
     "extremal": EXTREMAL,

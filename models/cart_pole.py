@@ -108,10 +108,10 @@ def cart_pole_swing_up(
 
     The defaults are the problem of [Kelly 2017], section 6 and appendix E.1.
 
-    Reference optimum: 58.807667458, by ``polish`` to 1e-10, without the track: no bound is
-    active, ``|u|`` <= 14.0 N and p <= 1.18 m. Multiple shooting holds its forces and costs
-    59.132, 58.888, 58.828 and 58.813 on 50, 100, 200 and 400 intervals, which extrapolates
-    to 58.807667.
+    From the problem's own guess direct methods end in a local optimum, 58.807667458 by
+    ``polish`` to 1e-10 (no bound is active: forces up to 14.0 N, the cart up to 1.18 m away).
+    A cheaper one, 57.944780307, swings the other way first; most random starts find it, see
+    ``python -m benchmarks certify --case cart-pole-swing-up``.
 
     Args:
         system: masses and length; default: those of Kelly.

@@ -8,7 +8,14 @@ from typing import Literal
 from ocp import OCP, ProblemError
 
 Family = Literal[
-    "direct", "between", "gradient", "indirect", "polish", "clearance", "instantaneous"
+    "direct",
+    "collocation",
+    "between",
+    "gradient",
+    "indirect",
+    "polish",
+    "clearance",
+    "instantaneous",
 ]
 Difficulty = Literal[
     "easy",

@@ -17,6 +17,7 @@ from tests.tolerances import DERIVATIVE, ROUNDING
 
 SYSTEM = CartPole(cart=1.3, pole=0.4, length=0.7, gravity=9.7)
 # Optimum of the swing-up, certified by `polish` to 1e-10 (second order included).
+# The local optimum that the straight guess leads to.
 REFERENCE = 58.807667458
 
 

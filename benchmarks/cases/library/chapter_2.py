@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.cases.library.entry import DIRECT, SMOOTH, certified, entry, root
+from benchmarks.cases.library.entry import DISCRETE, SMOOTH, certified, entry, root
 from models import (
     discrete_double_integrator,
     lq_regulator,
@@ -38,7 +38,7 @@ CHAPTER_2 = (
         _stable,
         "stable-plant",
         root(4051.2550447694803, _RICCATI),
-        DIRECT,
+        DISCRETE,
         "easy",
         "thesis (2.50), (2.55), N = 50",
     ),
@@ -46,7 +46,7 @@ CHAPTER_2 = (
         _unstable,
         "unstable-plant",
         root(5280.441131251924, _RICCATI),
-        DIRECT,
+        DISCRETE,
         "easy",
         "thesis (2.53), (2.55), N = 50",
     ),
@@ -54,7 +54,7 @@ CHAPTER_2 = (
         partial(discrete_double_integrator, 20, 0.1),
         "discrete-double-integrator",
         root(16.02339452102853, _RICCATI),
-        (*DIRECT, "gradient"),
+        (*DISCRETE, "gradient"),
         "easy",
         "thesis (2.39)",
         costate0=(32.04678904, 16.92816783),
@@ -72,7 +72,7 @@ CHAPTER_2 = (
         partial(thesis_tracking, 80),
         "mass-tracking",
         certified("mass-tracking"),
-        DIRECT,
+        DISCRETE,
         "state-constrained",
         "thesis (2.92) to (2.94), N = 80",
     ),

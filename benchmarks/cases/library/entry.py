@@ -8,11 +8,13 @@ from ocp import OCP
 
 SUITE = "library"
 # What suits a smooth problem: with given ends, and with free ones.
-SMOOTH: tuple[Family, ...] = ("direct", "indirect", "polish")
+SMOOTH: tuple[Family, ...] = ("direct", "collocation", "indirect", "polish")
 FREE_END: tuple[Family, ...] = (*SMOOTH, "gradient")
-DIRECT: tuple[Family, ...] = ("direct",)
+DIRECT: tuple[Family, ...] = ("direct", "collocation")
+# Discrete time has nothing to collocate.
+DISCRETE: tuple[Family, ...] = ("direct",)
 # A state constraint: once at the nodes, once between them too.
-BETWEEN: tuple[Family, ...] = ("direct", "between")
+BETWEEN: tuple[Family, ...] = (*DIRECT, "between")
 
 BONNANS = "[Bonnans et al. 2017]"
 DOLAN = "[Dolan, More & Munson 2004]"
