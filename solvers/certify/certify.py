@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ocp import Solution, UnsupportedProblem, whole
+from ocp import Solution, Status, UnsupportedProblem, whole
 from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
@@ -15,9 +15,12 @@ from solvers.certify.estimates import (
     on_grid,
 )
 from solvers.certify.global_evidence import (
+    CONVEXITY,
     EXTREMALS,
+    STARTS,
     convexity,
     every_extremal,
+    other_data,
     other_starts,
 )
 from solvers.certify.grid_conditions import grid_checks
@@ -92,9 +95,7 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
         *on_the_grid,
-        convexity(solution.problem),
-        other_starts(best, effort.starts, effort.seed, len(coarse.t) - 1),
-        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
+        *_global(best, effort, len(coarse.t) - 1),
     ]
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
 
@@ -128,6 +129,18 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], li
     return found, silent
 
 
+def _global(best: Estimate, effort: Effort, intervals: int) -> list[Check]:
+    """What can be said of the optimum being the global one."""
+    reason = other_data(best.solution)
+    if reason:
+        return [Check.skipped(name, reason) for name in (CONVEXITY, STARTS, EXTREMALS)]
+    return [
+        convexity(best.solution.problem),
+        other_starts(best, effort.starts, effort.seed, intervals),
+        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
+    ]
+
+
 def _agreement(estimates: list[Estimate], smooth: bool) -> Check:
     if len(estimates) < _METHODS:
         return Check(AGREEMENT, Verdict.FAILS, "one method only")
@@ -154,7 +167,7 @@ def _second_order(best: Estimate) -> Check:
     """The word of ``polish``: no conjugate point."""
     if not best.is_extremal:
         return Check.skipped(SECOND_ORDER, "no extremal to test: see the curvature on the grid")
-    if best.solution.status.name == "SOLVED":
+    if best.solution.status is Status.SOLVED:
         return Check(SECOND_ORDER, Verdict.HOLDS, "H_uu > 0 and no conjugate point")
     if best.solution.problem.has_free_time:
         return Check.skipped(SECOND_ORDER, best.solution.message)
