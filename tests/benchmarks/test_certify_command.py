@@ -7,6 +7,7 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.cases import all_cases
 from benchmarks.certificates import Certificates
+from benchmarks.row import versions
 from solvers import Certificate, Check, Estimate, MultipleShooting, Verdict
 
 
@@ -22,7 +23,7 @@ def test_what_does_not_hold_is_said_again_from_the_file(
     tmp_path: Path, monkeypatch, capsys, verdict: Verdict, code: int
 ) -> None:
     file, name = tmp_path / "certificates.json", all_cases()[0].name
-    Certificates().with_(name, certificate(verdict)).write(file)
+    Certificates().with_(name, certificate(verdict).as_dict(), versions()).write(file)
     monkeypatch.setattr("benchmarks.commands.certify._wanted", lambda _: [all_cases()[0]])
     assert main(["certify", "--file", str(file)]) == code
     assert ("NOT certified" in capsys.readouterr().out) == bool(code)
@@ -31,7 +32,7 @@ def test_what_does_not_hold_is_said_again_from_the_file(
 def test_a_file_is_read_back(tmp_path: Path) -> None:
     file = tmp_path / "certificates.json"
     assert not Certificates.read(file).entries
-    written = Certificates().with_("a", certificate(Verdict.HOLDS))
+    written = Certificates().with_("a", certificate(Verdict.HOLDS).as_dict(), versions())
     written.write(file)
     assert Certificates.read(file) == written
     file.write_text("{}")
