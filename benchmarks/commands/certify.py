@@ -33,7 +33,7 @@ def _run(options: Namespace, console: Console) -> int:
     anew = options.again or options.case
     cases = [case for case in wanted if anew or case.name not in on_file.entries]
     effort = Effort(starts=options.starts, seed=options.seed)
-    failed = []
+    failed = [c.name for c in wanted if c not in cases and not on_file.entries[c.name]["holds"]]
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("certificates", total=len(cases))
         for case in cases:

@@ -164,6 +164,11 @@ class Certificate:
 
 
 def agreement(one: float, other: float) -> float:
-    """Return to how many digits two costs agree, relative to max(1, abs(cost))."""
+    """Return to how many digits two costs agree, relative to max(1, abs(cost)).
+
+    None where one is not finite.
+    """
     apart = abs(one - other) / max(1.0, abs(one))
+    if not np.isfinite(apart):
+        return 0.0
     return _MOST_DIGITS if apart == 0.0 else float(min(_MOST_DIGITS, -np.log10(apart)))

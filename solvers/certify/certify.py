@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ocp import Solution, UnsupportedProblem, whole
+from ocp import Solution, Status, UnsupportedProblem, whole
 from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
@@ -15,18 +15,24 @@ from solvers.certify.estimates import (
     on_grid,
 )
 from solvers.certify.global_evidence import (
+    CONVEXITY,
     EXTREMALS,
+    STARTS,
     convexity,
     every_extremal,
+    other_data,
     other_starts,
 )
 from solvers.certify.grid_conditions import grid_checks
 
 # So many independent methods are compared.
 _METHODS = 2
-AGREEMENT, FEASIBILITY, SECOND_ORDER = "agreement", "feasibility", "second order"
+AGREEMENT, RELATIVE = "agreement", "relative agreement"
+FEASIBILITY, SECOND_ORDER = "feasibility", "second order"
 # Digits asked of two methods: where no path constraint is active, and where one is.
 SMOOTH_DIGITS, OTHER_DIGITS = 8, 5
+# Digits count from 1; of a smaller cost itself two methods may differ by this share.
+_APART = 1e-3
 _SMOOTH_VIOLATION, _OTHER_VIOLATION = 1e-8, 1e-5
 _SMOOTH_DRIFT, _OTHER_DRIFT = 1e-6, 1e-3
 
@@ -59,9 +65,10 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     Methods that share nothing but the problem are taken to the end, as far as they apply:
     indirect multiple shooting, refined collocation, direct multiple shooting extrapolated over
     its grids; in discrete time the nonlinear program and a linear method. The first two have
-    to agree to 8 digits where an extremal is one of them, to 5 where not. Then the referee's
-    word on the trajectory, the Hamiltonian, the second-order test, the Karush-Kuhn-Tucker
-    conditions on a grid, and what can be said of the optimum being the global one.
+    to agree to 8 digits where an extremal is one of them, to 5 where not, and to a thousandth of
+    the cost itself. Then the referee's word on the trajectory, the Hamiltonian, the second-order
+    test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of the optimum being
+    the global one.
 
     Args:
         solution: near the optimum that is to be certified; of any method.
@@ -87,14 +94,13 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     on_the_grid = grid_checks(coarse)
     checks = [
         _agreement(estimates, smooth),
+        _relative_agreement(estimates),
         *silent,
         _feasibility(best, smooth),
         _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
         *on_the_grid,
-        convexity(solution.problem),
-        other_starts(best, effort.starts, effort.seed, len(coarse.t) - 1),
-        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
+        *_global(best, effort, len(coarse.t) - 1),
     ]
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
 
@@ -128,6 +134,18 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], li
     return found, silent
 
 
+def _global(best: Estimate, effort: Effort, intervals: int) -> list[Check]:
+    """What can be said of the optimum being the global one."""
+    reason = other_data(best.solution)
+    if reason:
+        return [Check.skipped(name, reason) for name in (CONVEXITY, STARTS, EXTREMALS)]
+    return [
+        convexity(best.solution.problem),
+        other_starts(best, effort.starts, effort.seed, intervals),
+        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
+    ]
+
+
 def _agreement(estimates: list[Estimate], smooth: bool) -> Check:
     if len(estimates) < _METHODS:
         return Check(AGREEMENT, Verdict.FAILS, "one method only")
@@ -136,6 +154,18 @@ def _agreement(estimates: list[Estimate], smooth: bool) -> Check:
     said = f"{digits:.1f} digits between {first.method} and {second.method}; {asked} asked"
     verdict = Verdict.HOLDS if digits >= asked else Verdict.FAILS
     return Check(AGREEMENT, verdict, said, digits, asked)
+
+
+def _relative_agreement(estimates: list[Estimate]) -> Check:
+    """Tolerances are absolute below 1: methods that see next to no cost agree on any trajectory."""
+    if len(estimates) < _METHODS:
+        return Check.skipped(RELATIVE, "one method only")
+    first, second = estimates
+    apart, size = abs(first.cost - second.cost), abs(first.cost)
+    said = f"{apart:.1e} apart at a cost of {size:.1e}"
+    if apart > _APART * size:
+        said += ": too small for the tolerances, state it in smaller units"
+    return Check.at_most(RELATIVE, apart, _APART * size, said)
 
 
 def _feasibility(best: Estimate, smooth: bool) -> Check:
@@ -154,7 +184,7 @@ def _second_order(best: Estimate) -> Check:
     """The word of ``polish``: no conjugate point."""
     if not best.is_extremal:
         return Check.skipped(SECOND_ORDER, "no extremal to test: see the curvature on the grid")
-    if best.solution.status.name == "SOLVED":
+    if best.solution.status is Status.SOLVED:
         return Check(SECOND_ORDER, Verdict.HOLDS, "H_uu > 0 and no conjugate point")
     if best.solution.problem.has_free_time:
         return Check.skipped(SECOND_ORDER, best.solution.message)

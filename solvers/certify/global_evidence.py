@@ -1,9 +1,14 @@
 """Is the local optimum the global one? A proof where the problem is convex, else evidence."""
 
+import casadi as ca
+import numpy as np
+
 from ocp import (
     OCP,
+    Data,
     ProblemError,
     Signal,
+    Solution,
     UnsupportedProblem,
     discretise,
     evaluate,
@@ -19,23 +24,55 @@ CONVEXITY, STARTS, EXTREMALS = "convexity", "other starts", "enumerated extremal
 _CHEAPER = 1e-3
 # For convexity a grid is enough that shows every matrix; more, where they change with time.
 _STEPS = 20
+# An eigenvalue this much below zero, relative to the largest one, is rounding.
+_ROUNDING = 1e-10
 # Of the extremals of a scan the cheapest are made exact.
 _ROOTS = 12
+
+
+def other_data(solution: Solution) -> str:
+    """Say which number of a run is not the problem's own, which is all that is searched here."""
+    ocp, own, run = solution.problem, Data.of(solution.problem), solution.data
+    if not ocp.has_free_start and not np.array_equal(own.x0, run.x0):
+        return f"the start {run.x0} is not that of the problem, {own.x0}"
+    if own.t0 != run.t0:
+        return f"t0 = {run.t0:g} s is not that of the problem, {own.t0:g} s"
+    declared = own.values.as_dict()
+    for name, value in run.values.as_dict().items():
+        if not np.array_equal(value, declared[name]):
+            return f"parameter '{name}' is not as the problem declares it"
+    return ""
 
 
 def convexity(ocp: OCP) -> Check:
     """Say whether every local optimum is the global one, since the problem is convex.
 
     Linear dynamics and constraints with a convex quadratic cost, sampled with zero-order hold.
+    In continuous time the running cost has to be convex itself: what is sampled may be so where
+    controls that change faster than the samples are not.
     """
     try:
         if not ocp.model.is_discrete and not ocp.has_free_time:
-            ocp = discretise(ocp, ocp.duration / _STEPS)
+            sampled = discretise(ocp, ocp.duration / _STEPS)
+            least = _least_weight(ocp)
+            if least < -_ROUNDING:
+                return Check.skipped(
+                    CONVEXITY, f"the running cost is concave somewhere: eigenvalue {least:.1e}"
+                )
+            ocp = sampled
         linear_quadratic(ocp)
     except (UnsupportedProblem, ProblemError) as reason:
         return Check.skipped(CONVEXITY, f"a local optimum need not be the global one: {reason}")
     said = "linear dynamics, convex quadratic cost: the local optimum is the global one"
     return Check(CONVEXITY, Verdict.HOLDS, said)
+
+
+def _least_weight(ocp: OCP) -> float:
+    """The least eigenvalue of a quadratic running cost, relative to the largest one."""
+    z = ca.vertcat(ocp.model.x, ocp.model.u)
+    weights = ca.hessian(ca.SX(ocp.running_cost), z)[0]
+    values = np.linalg.eigvalsh(np.array(ca.evalf(ca.densify(weights))))
+    return float(values[0] / max(np.abs(values).max(), np.finfo(float).tiny))
 
 
 def other_starts(best: Estimate, starts: int, seed: int, intervals: int) -> Check:

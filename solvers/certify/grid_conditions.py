@@ -17,6 +17,8 @@ _DEPENDENT = 1e-9
 # Of the gradient of the Lagrangian and of multipliers of the wrong sign, relative to the
 # largest entry of the cost's gradient and 1.
 _RESIDUAL = 1e-5
+# A multiplier this small, by the same measure, does not hold an inequality at its bound.
+_WEAK = 1e-5
 # Of the Lagrangian's eigenvalues on the null space, relative to its largest entry.
 _CURVED = 1e-7
 # Steps that the fit of multipliers with signs may take for each row.
@@ -57,7 +59,8 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
 
     Three checks come of it: the gradients of the active rows are independent (LICQ); the
     residual vanishes, with multipliers of the right signs; the Hessian of the Lagrangian is not
-    negative on the null space of the active rows.
+    negative on the null space of the active rows. Where it is negative once the inequalities
+    without a multiplier are let go, it decides nothing, and the third check counts as not made.
 
     Args:
         solution: of direct multiple shooting, controls held.
@@ -180,13 +183,35 @@ def _stationarity(point: _Point) -> Check:
 
 
 def _curvature(point: _Point) -> Check:
-    free = null_space(point.rows, rcond=_DEPENDENT)
-    if not free.shape[1]:
-        return Check(CURVATURE, Verdict.HOLDS, "the active rows leave no freedom")
-    reduced = free.T @ point.hessian @ free
-    least = float(np.linalg.eigvalsh((reduced + reduced.T) / 2.0)[0])
     scale = max(1.0, float(np.abs(point.hessian).max()))
-    said = f"smallest eigenvalue {least:.1e} in {free.shape[1]} free directions"
+    least, size = _least_curvature(point, np.ones(len(point.rows), dtype=bool))
+    if -least / scale <= _CURVED:
+        weak = _weak(point)
+        inside, _ = _least_curvature(point, ~weak)
+        if -inside / scale > _CURVED:
+            return Check.skipped(
+                CURVATURE,
+                f"smallest eigenvalue {inside:.1e} where {weak.sum()} inequalities that are met "
+                "without a multiplier are let go: a minimum only if all such ways lead out",
+            )
+    if not size:
+        return Check(CURVATURE, Verdict.HOLDS, "the active rows leave no freedom")
+    said = f"smallest eigenvalue {least:.1e} in {size} free directions"
     if abs(least) <= _CURVED * scale:
         said += ": flat, the optimum need not be unique"
     return Check.at_most(CURVATURE, -least / scale, _CURVED, said)
+
+
+def _weak(point: _Point) -> np.ndarray:
+    """Which inequalities are active, but do not hold the optimum back."""
+    scale = max(1.0, float(np.abs(point.slope).max()))
+    return (point.signs != 0) & (np.abs(point.multipliers) <= _WEAK * scale)
+
+
+def _least_curvature(point: _Point, kept: np.ndarray) -> tuple[float, int]:
+    """The least eigenvalue on the null space of some rows, and the size of that space."""
+    free = null_space(point.rows[kept], rcond=_DEPENDENT)
+    if not free.shape[1]:
+        return np.inf, 0
+    reduced = free.T @ point.hessian @ free
+    return float(np.linalg.eigvalsh((reduced + reduced.T) / 2.0)[0]), free.shape[1]

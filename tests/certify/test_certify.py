@@ -1,12 +1,14 @@
 """Whole certificates: true values hold, other local optima and impossible problems do not."""
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks.cases import TEXTBOOK, all_cases
-from models import double_integrator_energy
+from models import bryson_denham, double_integrator_energy
 from ocp import Box, Guess, ProblemError, UnsupportedProblem, solve
 from solvers import Certificate, Effort, MultipleShooting, Verdict, certify
-from solvers.certify.certify import AGREEMENT
+from solvers.certify.certify import AGREEMENT, RELATIVE
 from solvers.certify.global_evidence import EXTREMALS, STARTS
 from tests.certify.test_parts import integrator
 
@@ -47,6 +49,16 @@ def test_the_textbook_is_certified(case):
     assert certificate.holds, str(certificate)
     lower, upper = certificate.interval
     assert lower - 1e-9 <= case.reference.value <= upper + 1e-9
+
+
+@pytest.mark.slow
+def test_a_cost_below_all_tolerances_is_not_certified():
+    """Bryson and Denham's problem with 1e-10 of its cost: solvers stop anywhere."""
+    ocp = bryson_denham()
+    small = replace(ocp, running_cost=1e-10 * ocp.running_cost)
+    certificate = certify(solve(small, MultipleShooting(20)), QUICK)
+    assert verdicts(certificate)[RELATIVE] is Verdict.FAILS
+    assert not certificate.holds
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from solvers import Check, MultipleShooting, Verdict, polish
 from solvers.certify.certificate import agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.estimates import extrapolated
-from solvers.certify.global_evidence import convexity
+from solvers.certify.global_evidence import convexity, other_data
 from solvers.certify.grid_conditions import grid_checks
 
 LIMIT = 1e-6
@@ -55,6 +55,7 @@ def test_agreement_counts_digits(one, other, digits):
 
 def test_a_number_that_is_not_one_fails():
     assert Check.at_most("x", np.nan, 1.0, "").verdict is Verdict.FAILS
+    assert agreement(np.nan, 1.0) == agreement(1.0, np.nan) == agreement(np.inf, np.inf) == 0.0
 
 
 # -- extrapolation -------------------------------------------------------------------------
@@ -111,6 +112,32 @@ def test_at_a_free_final_time_the_hamiltonian_is_zero():
     assert hamiltonian_check(extremal, LIMIT).verdict is Verdict.HOLDS
     shifted = extremal.with_(costate=extremal.costate * 1.001)
     assert hamiltonian_check(shifted, LIMIT).verdict is Verdict.FAILS
+
+
+def test_the_hamiltonian_is_zero_at_a_free_final_time_with_time_in_the_cost_too():
+    x, u, t = ca.SX.sym("x"), ca.SX.sym("u"), ca.SX.sym("t")
+    ocp = OCP(
+        name="hurry",
+        model=Model(name="hurry", x=x, u=u, t=t, f=u),
+        x0=[1.0],
+        horizon=FreeTime(1.0, 0.1, 10.0),
+        running_cost=(1 + t) * (1 + u**2),
+        constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    )
+    extremal = polish(direct(ocp))
+    check = hamiltonian_check(extremal, LIMIT)
+    assert check.verdict is Verdict.HOLDS
+    assert "H = 0" in check.sentence
+    shifted = extremal.with_(costate=extremal.costate * 1.001)
+    assert hamiltonian_check(shifted, LIMIT).verdict is Verdict.FAILS
+
+
+def test_at_the_bound_of_a_final_time_the_hamiltonian_is_constant_but_not_zero():
+    """Not slower than in half a second: H = 1 - u^2 = -3 with u = -2."""
+    ocp = integrator(horizon=FreeTime(0.4, 0.1, 0.5), running=lambda x, u: 1 + u**2)
+    check = hamiltonian_check(direct(ocp), LIMIT)
+    assert check.verdict is Verdict.HOLDS
+    assert "constant" in check.sentence
 
 
 def test_a_signal_and_a_moving_constraint_are_not_checked():
@@ -186,6 +213,18 @@ def test_a_maximum_curves_the_wrong_way():
     assert curvature.verdict is Verdict.FAILS
 
 
+@pytest.mark.parametrize(("sign", "verdict"), [(-1, Verdict.NOT_CHECKED), (1, Verdict.HOLDS)])
+def test_a_maximum_at_a_bound_without_a_multiplier_does_not_hold(sign, verdict):
+    """u = 0 on 0 <= u <= 1: the cost of -u^2 is largest there, its gradient vanishes."""
+    box = Box([0.0], [1.0])
+    ocp = integrator(ends=free, running=lambda x, u: sign * u**2, control_bounds=box)
+    best = direct(integrator(ends=free))
+    still = best.with_(problem=ocp, u=np.zeros_like(best.u), x=np.ones_like(best.x))
+    _, multipliers, curvature = grid_checks(still)
+    assert multipliers.verdict is Verdict.HOLDS
+    assert curvature.verdict is verdict
+
+
 # -- the whole -----------------------------------------------------------------------------
 
 
@@ -194,3 +233,18 @@ def test_convexity_is_seen_and_its_absence_named():
     check = convexity(van_der_pol())
     assert check.verdict is Verdict.NOT_CHECKED
     assert "not linear" in check.sentence
+
+
+def test_a_cost_that_only_its_samples_make_convex_is_not():
+    """int x^2 - 1e-4 u^2 has no bottom: fast controls pay and move nothing."""
+    ocp = integrator(ends=free, running=lambda x, u: x**2 - 1e-4 * u**2)
+    check = convexity(ocp)
+    assert check.verdict is Verdict.NOT_CHECKED
+    assert "concave" in check.sentence
+
+
+def test_another_start_than_the_problem_s_is_noticed():
+    ocp = integrator()
+    assert other_data(direct(ocp)) == ""
+    elsewhere = MultipleShooting(20).build(ocp).run(x0=[2.0])
+    assert "start" in other_data(elsewhere)
