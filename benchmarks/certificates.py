@@ -1,22 +1,13 @@
-"""Certificates of cases: made here, kept as data, read by the library as its references."""
+"""The file of certificates: committed data, and the references of the library."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cases import Case
-from benchmarks.row import versions
-from ocp import Solution, SolverError
-from solvers import Certificate, Check, Effort, MultipleShooting, certify, multistart
-
-CLOSED_FORM = "closed form"
-# Digits in which a certificate has to agree with a derivation.
-_CLOSED_FORM_ERROR = 1e-8
-# Where a certificate starts: the finer grid where the coarser solves nothing; what held
-# controls violate between nodes is left to its methods.
-_INTERVALS, _BETWEEN = (75, 300), 1e-2
+COMMITTED = Path(__file__).parent / "data" / "certificates.json"
 
 
 @dataclass(frozen=True)
@@ -46,10 +37,11 @@ class Certificates:
         except (json.JSONDecodeError, KeyError, TypeError) as reason:
             raise ValueError(f"{file} is no file of certificates: {reason!r}") from None
 
-    def with_(self, case: str, certificate: Certificate) -> "Certificates":
-        """Return them with one more, or one anew."""
-        entries = {**self.entries, case: certificate.as_dict()}
-        return Certificates(versions(), dict(sorted(entries.items())))
+    def with_(
+        self, case: str, entry: Mapping[str, Any], versions: Mapping[str, str]
+    ) -> "Certificates":
+        """Return them with one more, or one anew, and with what computed it."""
+        return Certificates(versions, dict(sorted({**self.entries, case: entry}.items())))
 
     def write(self, file: Path) -> None:
         """Write them in one piece, so that a killed run leaves the old file or the new one."""
@@ -60,29 +52,7 @@ class Certificates:
         draft.replace(file)
 
 
-def certify_case(case: Case, effort: Effort) -> Certificate:
-    """Certify the best optimum that a few direct starts find.
-
-    The problem's own guess is the first of them.
-
-    Raises:
-        SolverError: if none of them is feasible.
-        UnsupportedProblem: if no method says anything.
-    """
-    certificate = certify(_best_start(case, effort), effort)
-    reference = case.reference
-    if reference is None or not reference.is_closed_form:
-        return certificate
-    apart = abs(certificate.cost - reference.value) / max(1.0, abs(reference.value))
-    said = f"{reference.value:.12g}, {apart:.1e} apart ({reference.how})"
-    return certificate.with_check(Check.at_most(CLOSED_FORM, apart, _CLOSED_FORM_ERROR, said))
-
-
-def _best_start(case: Case, effort: Effort) -> Solution:
-    ocp = case.build()
-    for intervals in _INTERVALS:
-        solver = MultipleShooting(intervals)
-        found = multistart(ocp, solver, effort.starts, effort.seed, violation=_BETWEEN)
-        if found:
-            return found[0].solution
-    raise SolverError(f"{case.name}: none of {effort.starts} starts is feasible")
+@cache
+def committed() -> Certificates:
+    """Return the certificates that the library stands on."""
+    return Certificates.read(COMMITTED)

@@ -8,13 +8,14 @@ from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
-from benchmarks.certificates import Certificates, certify_case
+from benchmarks.certificates import COMMITTED, Certificates
+from benchmarks.certify_case import certify_case
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import named, positive
+from benchmarks.row import versions
 from ocp import OCPError
 from solvers import Effort
 
-COMMITTED = Path("benchmarks") / "data" / "certificates.json"
 _SUITE = "library"
 
 
@@ -43,7 +44,7 @@ def _run(options: Namespace, console: Console) -> int:
                 failed.append(case.name)
             else:
                 bar.console.print(str(certificate), highlight=False, soft_wrap=True)
-                on_file = on_file.with_(case.name, certificate)
+                on_file = on_file.with_(case.name, certificate.as_dict(), versions())
                 on_file.write(options.file)
                 failed += [] if certificate.holds else [case.name]
             bar.advance(task)

@@ -1,7 +1,7 @@
 """A certificate: an optimal value as an interval, and everything that was and was not checked."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
@@ -130,10 +130,6 @@ class Certificate:
     def not_checked(self) -> tuple[Check, ...]:
         """What the certificate does not say."""
         return tuple(c for c in self.checks if c.verdict is Verdict.NOT_CHECKED)
-
-    def with_check(self, check: Check) -> "Certificate":
-        """Return the certificate with one more check."""
-        return replace(self, checks=(*self.checks, check))
 
     def __str__(self) -> str:
         """Return the whole certificate as text."""

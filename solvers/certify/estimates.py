@@ -58,8 +58,9 @@ def by_polish(solution: Solution) -> Estimate:
     verdict = evaluate(polished, tolerance=TOLERANCE)
     if verdict.violation > _INACTIVE:
         raise NoEstimateError(f"{verdict.worst} is violated by {verdict.violation:.1e} without it")
-    error = max(abs(verdict.cost - polished.cost), verdict.cost_error, polished.residual)
-    said = f"the referee's cost differs by {abs(verdict.cost - polished.cost):.1e}"
+    apart = abs(verdict.cost - polished.cost)
+    error = max(apart, verdict.cost_error, polished.residual, accuracy * (1.0 + abs(verdict.cost)))
+    said = f"the referee's cost differs by {apart:.1e}"
     return Estimate(
         method=f"indirect multiple shooting, residual {polished.residual:.1e}",
         cost=verdict.cost,
@@ -104,7 +105,7 @@ def by_collocation(coarse: Solution) -> Estimate:
     return Estimate(
         method=f"Radau collocation, {pieces} intervals",
         cost=verdict.cost,
-        error=max(change, bias, verdict.cost_error),
+        error=max(change, bias, verdict.cost_error, TOLERANCE * (1.0 + abs(verdict.cost))),
         violation=verdict.violation,
         solution=answer,
         sentence=f"the last finer mesh changed the cost by {change:.1e}",

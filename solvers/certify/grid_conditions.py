@@ -19,6 +19,8 @@ _DEPENDENT = 1e-9
 _RESIDUAL = 1e-5
 # Of the Lagrangian's eigenvalues on the null space, relative to its largest entry.
 _CURVED = 1e-7
+# Steps that the fit of multipliers with signs may take for each row.
+_ROWS = 10
 
 INDEPENDENCE, STATIONARITY, CURVATURE = "LICQ", "multipliers", "curvature on the grid"
 
@@ -116,7 +118,7 @@ def _fitted(rows: np.ndarray, signs: np.ndarray, slope: np.ndarray) -> np.ndarra
     if rank == len(rows):
         return free
     least, most = np.where(signs > 0, 0.0, -np.inf), np.where(signs < 0, 0.0, np.inf)
-    return lsq_linear(rows.T, -slope, (least, most), tol=1e-12).x
+    return lsq_linear(rows.T, -slope, (least, most), method="bvls", max_iter=_ROWS * len(rows)).x
 
 
 def _active(

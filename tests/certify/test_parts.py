@@ -94,7 +94,7 @@ def test_time_in_the_problem_is_taken_off():
         name="aging",
         model=Model(name="aging", x=x, u=u, t=t, f=u),
         x0=[1.0],
-        horizon: float | FreeTime = 1.0,
+        horizon=1.0,
         running_cost=(1 + t) * u**2,
         constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
     )

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from benchmarks.cases.case import Case, Difficulty, Family, Published, Reference
+from benchmarks.certificates import committed
 from ocp import OCP
 
 SUITE = "library"
@@ -58,8 +59,24 @@ def root(value: float, equations: str) -> Reference:
     return Reference(value, _PRINTED * max(1.0, abs(value)), f"closed form: {equations}")
 
 
-def certified(value: float, error: float, how: str) -> Reference:
-    """Return a computed reference.
+def certified(name: str) -> Reference:
+    """Return the reference that ``python -m benchmarks certify`` wrote for a case.
+
+    Raises:
+        KeyError: if there is none.
+        ValueError: if the certificate does not hold.
+    """
+    entry = committed().entries[name]
+    if not entry["holds"]:
+        raise ValueError(f"the certificate of '{name}' does not hold: no reference")
+    lower, upper = entry["interval"]
+    methods = " and ".join(estimate["method"] for estimate in entry["estimates"])
+    how = f"certified: {methods}, {entry['digits']:.1f} digits alike"
+    return Reference((lower + upper) / 2.0, (upper - lower) / 2.0, how)
+
+
+def computed(value: float, error: float, how: str) -> Reference:
+    """Return a reference that methods agree on of which ``certify`` has only one.
 
     Args:
         value: the best estimate.

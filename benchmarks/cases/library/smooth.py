@@ -26,13 +26,11 @@ from models import (
     zermelo,
 )
 
-_POLISHED = "polished from direct, steps doubled until 1e-10"
-
 SMOOTH_PROBLEMS = (
     entry(
         van_der_pol,
         "van-der-pol",
-        certified(1.047806908220, 1e-11, _POLISHED),
+        certified("van-der-pol"),
         FREE_END,
         "smooth",
         BONNANS,
@@ -41,7 +39,7 @@ SMOOTH_PROBLEMS = (
     entry(
         rayleigh,
         "rayleigh",
-        certified(29.376079655945, 1e-10, _POLISHED),
+        certified("rayleigh"),
         FREE_END,
         "smooth",
         "[Maurer & Augustin 2001]",
@@ -49,7 +47,7 @@ SMOOTH_PROBLEMS = (
     entry(
         hypersensitive,
         "hypersensitive",
-        certified(1.330806904945, 2e-11, _POLISHED),
+        certified("hypersensitive"),
         ("direct", "polish"),
         "long",
         "[Rao & Mease 2000]",
@@ -57,7 +55,7 @@ SMOOTH_PROBLEMS = (
     entry(
         pendulum_swing_up,
         "pendulum-swing-up",
-        certified(0.580559833252, 1e-10, f"{_POLISHED}; best of 16 starts"),
+        certified("pendulum-swing-up"),
         SMOOTH,
         "nonconvex",
         "made for this library",
@@ -66,10 +64,11 @@ SMOOTH_PROBLEMS = (
     entry(
         cart_pole_swing_up,
         "cart-pole-swing-up",
-        certified(58.807667458, 1e-8, "polished from direct without the bounds, none is active"),
+        certified("cart-pole-swing-up"),
         DIRECT,
         "nonconvex",
         "[Kelly 2017]",
+        local_costs=(58.807667458,),
     ),
     entry(
         zermelo,
@@ -108,7 +107,7 @@ SMOOTH_PROBLEMS = (
     entry(
         isoperimetric,
         "isoperimetric",
-        certified(-0.37550377, 6e-8, f"{_POLISHED}, the bound as a clipped minimiser"),
+        certified("isoperimetric"),
         ("direct", "indirect"),
         "smooth",
         RUTQUIST,
@@ -117,7 +116,7 @@ SMOOTH_PROBLEMS = (
     entry(
         electric_vehicle,
         "electric-vehicle",
-        certified(1228580.28988877, 1e-5, _POLISHED),
+        certified("electric-vehicle"),
         SMOOTH,
         "smooth",
         "[Petit & Sciarretta 2011]",

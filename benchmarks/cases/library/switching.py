@@ -3,7 +3,7 @@
 from functools import partial
 
 from benchmarks.cases.case import Published
-from benchmarks.cases.library.entry import BETWEEN, BONNANS, DIRECT, DOLAN, certified, entry, root
+from benchmarks.cases.library.entry import BETWEEN, BONNANS, DIRECT, DOLAN, computed, entry, root
 from models import catalyst_mixing, fuller, goddard, pendulum_minimum_time, two_catalysts
 
 _ARCS = "shooting on the arcs of the minimum principle"
@@ -22,7 +22,7 @@ SWITCHING = (
     entry(
         pendulum_minimum_time,
         "pendulum-minimum-time",
-        certified(7.586693492820, 1e-9, "switching times optimised; best of 16 starts"),
+        computed(7.586693492820, 1e-9, "switching times optimised; best of 16 starts"),
         DIRECT,
         "bang-bang",
         "made for this library",
@@ -47,7 +47,7 @@ SWITCHING = (
     entry(
         goddard,
         "goddard",
-        certified(-1.0128369183175, 1e-11, f"{_ARCS}: full, singular, none"),
+        computed(-1.0128369183175, 1e-11, f"{_ARCS}: full, singular, none"),
         BETWEEN,
         "singular",
         DOLAN,
@@ -56,7 +56,7 @@ SWITCHING = (
     entry(
         partial(goddard, fastest=0.1),
         "goddard-slow",
-        certified(-1.0125763246569, 1e-11, f"{_ARCS}: full, singular, limit, none"),
+        computed(-1.0125763246569, 1e-11, f"{_ARCS}: full, singular, limit, none"),
         BETWEEN,
         "singular",
         "[Bonnans et al. 2017], after [Bryson & Ho 1975]",
