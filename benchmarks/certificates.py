@@ -34,13 +34,18 @@ class Certificates:
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
             return cls(content["versions"], content["cases"])
-        except (json.JSONDecodeError, KeyError, TypeError) as reason:
+        except (OSError, ValueError, KeyError, TypeError) as reason:
             raise ValueError(f"{file} is no file of certificates: {reason!r}") from None
 
     def with_(
         self, case: str, entry: Mapping[str, Any], versions: Mapping[str, str]
     ) -> "Certificates":
-        """Return them with one more, or one anew, and with what computed it."""
+        """Return them with one more, or one anew, and with what computed it.
+
+        A certificate that holds is not given up for one that does not.
+        """
+        if self.entries.get(case, {}).get("holds") and not entry["holds"]:
+            return self
         return Certificates(versions, dict(sorted({**self.entries, case: entry}.items())))
 
     def write(self, file: Path) -> None:

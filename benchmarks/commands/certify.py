@@ -1,5 +1,6 @@
 """``certify``: the reference values of the library, each with its evidence."""
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
@@ -28,11 +29,15 @@ def _options(parser: ArgumentParser) -> None:
 
 
 def _run(options: Namespace, console: Console) -> int:
-    on_file = Certificates.read(options.file)
+    try:
+        on_file = Certificates.read(options.file)
+        effort = Effort(starts=options.starts, seed=options.seed)
+    except (ValueError, OCPError) as reason:
+        print(reason, file=sys.stderr)
+        return 2
     wanted = _wanted(options.case)
     anew = options.again or options.case
     cases = [case for case in wanted if anew or case.name not in on_file.entries]
-    effort = Effort(starts=options.starts, seed=options.seed)
     failed = [c.name for c in wanted if c not in cases and not on_file.entries[c.name]["holds"]]
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("certificates", total=len(cases))

@@ -125,8 +125,11 @@ def _multipliers(
     0 where inactive, at least 0 at an upper bound, at most 0 at a lower one.
     """
     box = stacked_box(constraints)
-    least = np.where(value <= np.asarray(box.lower) + _ACTIVE, -np.inf, 0.0)
-    most = np.where(value >= np.asarray(box.upper) - _ACTIVE, np.inf, 0.0)
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    # An equation pulls either way, also where it is missed.
+    equation = lower == upper
+    least = np.where(equation | (value <= lower + _ACTIVE), -np.inf, 0.0)
+    most = np.where(equation | (value >= upper - _ACTIVE), np.inf, 0.0)
     nu, active = np.zeros(len(value)), least < most
     if active.any():
         signs = (least[active], most[active])

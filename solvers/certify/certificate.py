@@ -157,7 +157,12 @@ class Certificate:
                 for e in self.estimates
             ],
             "checks": [
-                {"name": c.name, "verdict": c.verdict.value, "evidence": c.sentence}
+                {
+                    "name": c.name,
+                    "verdict": c.verdict.value,
+                    "evidence": c.sentence,
+                    "decisive": c.decisive,
+                }
                 for c in self.checks
             ],
         }

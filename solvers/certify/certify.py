@@ -57,6 +57,7 @@ class Effort:
         """Check the numbers."""
         whole(self.intervals, "certify: intervals")
         whole(self.starts, "certify: starts")
+        whole(self.seed, "certify: seed", least=0)
 
 
 def certify(solution: Solution, effort: Effort | None = None) -> Certificate:

@@ -15,21 +15,35 @@ _LEAST, _ROUND, _ROUNDING = 10.0, 5.0, 1e-9
 
 
 def degrees(subject: Subject) -> Iterator[Finding]:
-    """Compare starts, bounds, targets and wanted values of every angle with 10, in fives."""
-    for i in _angles(subject):
-        name = subject.ocp.model.x_names[i]
-        for what, value in _numbers(subject, i):
-            if np.isfinite(value) and abs(value) >= _LEAST and value % _ROUND < _ROUNDING:
-                yield Finding(
-                    Cause.DEGREES,
-                    Severity.WARNING,
-                    (name,),
-                    f"The {what} of {name} is {value:g} rad, {value / (2 * np.pi):.3g} turns. "
-                    f"If degrees are meant, write {np.deg2rad(value):.6g} (numpy.deg2rad).",
-                    float(value),
-                    "rad",
-                )
-                break
+    """Compare starts, bounds, targets and wanted values of every angle with 10, in fives.
+
+    Controls in radians too, by their bounds.
+    """
+    names = subject.ocp.model.x_names
+    found = [(names[i], *said) for i in _angles(subject) for said in _numbers(subject, i)]
+    named: set[str] = set()
+    for name, what, value in (*found, *_of_controls(subject)):
+        round_one = np.isfinite(value) and abs(value) >= _LEAST and value % _ROUND < _ROUNDING
+        if round_one and name not in named:
+            named.add(name)
+            yield Finding(
+                Cause.DEGREES,
+                Severity.WARNING,
+                (name,),
+                f"The {what} of {name} is {value:g} rad, {value / (2 * np.pi):.3g} turns. "
+                f"If degrees are meant, write {np.deg2rad(value):.6g} (numpy.deg2rad).",
+                float(value),
+                "rad",
+            )
+
+
+def _of_controls(subject: Subject) -> Iterator[tuple[str, str, float]]:
+    """Yield the bounds of every control in radians."""
+    m, box = subject.ocp.model, subject.ocp.control_bounds
+    for i, unit in enumerate(m.u_units):
+        if unit == "rad":
+            for side in ("lower", "upper"):
+                yield m.u_names[i], f"{side} bound", float(np.asarray(getattr(box, side))[i])
 
 
 def _angles(subject: Subject) -> Iterator[int]:
