@@ -20,8 +20,8 @@ from solvers import (
 SUITE = "library"
 # Polished until the cost changes by less, relative to 1 + cost.
 ACCURACY = 1e-10
-# Collocation: the first mesh, with edges where a third and a fourth begin; the accepted defect.
-FIRST_MESH, DEFECT = Collocation(intervals=24), 1e-8
+# Collocation: the first mesh, fine enough for the ends of constrained arcs; the accepted defect.
+FIRST_MESH, DEFECT = Collocation(intervals=36), 1e-8
 
 
 def _grids(case: Case) -> tuple[int, int]:

@@ -11,12 +11,13 @@ INTERVALS: dict[Difficulty, tuple[int, int]] = {"long": (400, 1600)}
 USUAL = (100, 400)
 
 # Held controls: an error of the order h² of the cost, h at an active mixed constraint; the states
-# carry the integrator's error to the end.
+# carry the integrator's error to the end. The largest on smooth ground is that of the cart-pole,
+# 1.7e-3 at 100 intervals and a sixteenth of it at 400.
 DIRECT_COARSE: dict[Difficulty, Tolerance] = {
     "easy": (2e-3, 1e-6),
     "smooth": (1e-3, 1e-6),
     "long": (5e-3, 1e-4),
-    "nonconvex": (1e-3, 1e-4),
+    "nonconvex": (2e-3, 1e-4),
     "bang-bang": (5e-4, 1e-4),
     "singular": (2e-5, 1e-6),
     "state-constrained": (1e-3, 1e-3),
@@ -26,7 +27,7 @@ DIRECT_FINE: dict[Difficulty, Tolerance] = {
     "easy": (1e-4, 1e-7),
     "smooth": (1e-4, 1e-7),
     "long": (5e-4, 1e-6),
-    "nonconvex": (1e-4, 1e-6),
+    "nonconvex": (2e-4, 1e-6),
     "bang-bang": (5e-5, 1e-6),
     "singular": (2e-6, 1e-7),
     "state-constrained": (1e-4, 1e-4),

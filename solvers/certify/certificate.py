@@ -1,7 +1,7 @@
 """A certificate: an optimal value as an interval, and everything that was and was not checked."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ocp import Solution
 
+AGREEMENT = "agreement"
 _MOST_DIGITS = 16.0
 
 
@@ -130,6 +131,17 @@ class Certificate:
     def not_checked(self) -> tuple[Check, ...]:
         """What the certificate does not say."""
         return tuple(c for c in self.checks if c.verdict is Verdict.NOT_CHECKED)
+
+    def beside(self, derivation: Check) -> "Certificate":
+        """Return the certificate beside a value that was derived.
+
+        Where the two agree, it decides nothing any more how far two numerical methods do.
+        """
+        agree = derivation.verdict is Verdict.HOLDS
+        checks = (
+            replace(c, decisive=False) if agree and c.name == AGREEMENT else c for c in self.checks
+        )
+        return replace(self, checks=(*checks, derivation))
 
     def __str__(self) -> str:
         """Return the whole certificate as text."""

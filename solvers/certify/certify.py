@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ocp import Solution, Status, UnsupportedProblem, whole
-from solvers.certify.certificate import Certificate, Check, Estimate, Verdict, agreement
+from solvers.certify.certificate import AGREEMENT, Certificate, Check, Estimate, Verdict, agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
 from solvers.certify.estimates import (
@@ -27,7 +27,7 @@ from solvers.certify.grid_conditions import grid_checks
 
 # So many independent methods are compared.
 _METHODS = 2
-AGREEMENT, RELATIVE = "agreement", "relative agreement"
+RELATIVE = "relative agreement"
 FEASIBILITY, SECOND_ORDER = "feasibility", "second order"
 # Digits asked of two methods: where no path constraint is active, and where one is.
 SMOOTH_DIGITS, OTHER_DIGITS = 8, 5

@@ -8,7 +8,8 @@ from benchmarks.cases import TEXTBOOK, all_cases
 from models import bryson_denham, double_integrator_energy
 from ocp import Box, Guess, ProblemError, UnsupportedProblem, solve
 from solvers import Certificate, Effort, MultipleShooting, Verdict, certify
-from solvers.certify.certify import AGREEMENT, RELATIVE
+from solvers.certify.certificate import AGREEMENT
+from solvers.certify.certify import RELATIVE
 from solvers.certify.global_evidence import EXTREMALS, STARTS
 from tests.certify.test_parts import integrator
 

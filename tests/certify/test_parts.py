@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from models import bryson_denham, double_integrator_energy, van_der_pol
 from ocp import OCP, Box, Constraint, FreeTime, Model, Signal, solve
-from solvers import Check, MultipleShooting, Verdict, polish
-from solvers.certify.certificate import agreement
+from solvers import Certificate, Check, Estimate, MultipleShooting, Verdict, polish
+from solvers.certify.certificate import AGREEMENT, agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.estimates import extrapolated
 from solvers.certify.global_evidence import convexity, other_data
@@ -248,3 +248,11 @@ def test_another_start_than_the_problem_s_is_noticed():
     assert other_data(direct(ocp)) == ""
     elsewhere = MultipleShooting(20).build(ocp).run(x0=[2.0])
     assert "start" in other_data(elsewhere)
+
+
+@pytest.mark.parametrize(("verdict", "holds"), [(Verdict.HOLDS, True), (Verdict.FAILS, False)])
+def test_a_derivation_that_agrees_stands_for_the_second_method(verdict, holds):
+    best = Estimate("one", 1.0, 1e-9, 0.0, direct(integrator()), "")
+    alone = Certificate("x", (best, best), (Check(AGREEMENT, Verdict.FAILS, ""),))
+    assert not alone.holds
+    assert alone.beside(Check("closed form", verdict, "")).holds is holds
