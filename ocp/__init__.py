@@ -19,6 +19,7 @@ from ocp.linear.structure import linear_quadratic
 from ocp.linear.terminal_set import Polyhedron, terminal_set, with_terminal_set
 from ocp.model import Model
 from ocp.mpc.applied import Applied
+from ocp.mpc.backup import instantaneous, saturated_lqr
 from ocp.mpc.decision import Attempt, Controller, ControlRefused, Decision, Outcome
 from ocp.mpc.driver import MPC
 from ocp.mpc.law import Law
@@ -102,12 +103,14 @@ __all__ = [
     "evaluate",
     "hamiltonian",
     "instance",
+    "instantaneous",
     "interpolate",
     "linear_quadratic",
     "numbers",
     "records",
     "replay",
     "replay_all",
+    "saturated_lqr",
     "solve",
     "stationary",
     "symbol_kind",
