@@ -1,5 +1,6 @@
 """Laws for when there is no plan: the saturated regulator, and instantaneous control."""
 
+from collections.abc import Callable
 from typing import Literal
 
 import casadi as ca
@@ -10,12 +11,14 @@ from ocp.expressions import numbers
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import stationary
 from ocp.linear.structure import linear_quadratic
-from ocp.mpc.asking import Rule
 from ocp.optimality import derive
 from ocp.problem import OCP
 
+# (x, t) -> u (m,).
+Feedback = Callable[[np.ndarray, float], np.ndarray]
 
-def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Rule:
+
+def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Feedback:
     r"""Return the regulator of a linear-quadratic problem, clipped to the control bounds.
 
     .. math::
@@ -52,7 +55,7 @@ def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Rule:
 
 def instantaneous(
     ocp: OCP, *, reach: float = 0.1, sent: Literal["control", "rate"] = "control"
-) -> Rule:
+) -> Feedback:
     r"""Return the control that is best if the running cost keeps its present slope for a while.
 
     .. math:: u = \arg\min_u L(x, u) + \tau L_x f(x, u)

@@ -117,7 +117,7 @@ def test_the_rate_is_what_the_control_makes_of_the_state():
     np.testing.assert_allclose(rate, np.array(ocp.functions.rate(x, u, 0.0, [])).ravel())
     assert Applied("rate").size(ocp) == len(np.atleast_1d(rate))
     with pytest.raises(ProblemError, match="neither"):
-        instantaneous(ocp, sent="torque")
+        instantaneous(ocp, sent="torque")  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("reach", [0.0, -1.0, np.nan])
