@@ -4,9 +4,9 @@ from argparse import Namespace
 
 from rich.console import Console
 
-from benchmarks.clear_table import clear_table
 from benchmarks.commands.command import Command, no_options
-from benchmarks.greedy_gap import greedy_table
+from benchmarks.questions.clear_table import clear_table
+from benchmarks.questions.greedy_gap import greedy_table
 
 
 def _greedy(options: Namespace, console: Console) -> int:

@@ -8,10 +8,10 @@ from benchmarks.cases import all_cases
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import add_out, add_workers, named
 from benchmarks.commands.swept import print_sweep
-from benchmarks.executors import Execution
-from benchmarks.method import Settings
-from benchmarks.methods import all_methods
-from benchmarks.pictures import bench_picture
+from benchmarks.methods.every import all_methods
+from benchmarks.methods.method import Settings
+from benchmarks.pictures.main_job import bench_picture
+from benchmarks.sweep.executors import Execution
 
 BENCH_CASES = tuple(f"arm-{i:03d}-sum" for i in range(1, 7))
 BENCH_METHODS = (

@@ -9,11 +9,11 @@ from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.cases import Case, all_cases
-from benchmarks.certificates import COMMITTED, Certificates
-from benchmarks.certify_case import certify_case
+from benchmarks.cases.library.certificates import COMMITTED, Certificates
+from benchmarks.cases.library.certify_case import certify_case
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import named, positive
-from benchmarks.row import versions
+from benchmarks.sweep.row import versions
 from ocp import OCPError
 from solvers import Effort
 

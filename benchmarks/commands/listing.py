@@ -7,7 +7,7 @@ from rich.table import Table
 
 from benchmarks.cases import all_cases
 from benchmarks.commands.command import Command, no_options
-from benchmarks.methods import all_methods
+from benchmarks.methods.every import all_methods
 
 
 def _run(options: Namespace, console: Console) -> int:

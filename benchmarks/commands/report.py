@@ -7,8 +7,8 @@ from rich.console import Console
 
 from benchmarks.commands.command import Command
 from benchmarks.report import report_page
-from benchmarks.row import RESULTS
-from benchmarks.rows_file import read_found
+from benchmarks.sweep.row import RESULTS
+from benchmarks.sweep.rows_file import read_found
 
 
 def _options(parser: ArgumentParser) -> None:

@@ -8,9 +8,9 @@ from benchmarks.cases import all_cases
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import add_out, add_workers, named, positive, seconds
 from benchmarks.commands.swept import print_sweep
-from benchmarks.executors import Execution
-from benchmarks.method import Settings
-from benchmarks.methods import all_methods
+from benchmarks.methods.every import all_methods
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.executors import Execution
 
 
 def _options(parser: ArgumentParser) -> None:

@@ -4,12 +4,12 @@ from argparse import ArgumentParser, Namespace
 
 from rich.console import Console
 
-from benchmarks.arm_speed import INTERVALS, LINKS
-from benchmarks.arm_speed_tables import print_arm_speed
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import positive
-from benchmarks.linear_speed import HORIZONS
-from benchmarks.speed_tables import print_speed
+from benchmarks.speed.arm import INTERVALS, LINKS
+from benchmarks.speed.arm_tables import print_arm_speed
+from benchmarks.speed.linear import HORIZONS
+from benchmarks.speed.linear_tables import print_speed
 
 
 def _linear_options(parser: ArgumentParser) -> None:

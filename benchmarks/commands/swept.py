@@ -6,18 +6,18 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.cases import Case
-from benchmarks.claims import below_reference, claims_of
-from benchmarks.comparison import SUITE as COMPARISON
-from benchmarks.comparison import comparison_claims, comparison_table
-from benchmarks.executors import Execution
-from benchmarks.extremes import extremes_table
-from benchmarks.guard import SweepError
-from benchmarks.jacobians import jacobian_table
-from benchmarks.method import Method, Settings
-from benchmarks.row import RESULTS, Row
-from benchmarks.sweep import sweep
-from benchmarks.table import table_of
-from benchmarks.task import tasks_of
+from benchmarks.claims.every import below_reference, claims_of
+from benchmarks.methods.method import Method, Settings
+from benchmarks.sweep.executors import Execution
+from benchmarks.sweep.guard import SweepError
+from benchmarks.sweep.row import RESULTS, Row
+from benchmarks.sweep.sweep import sweep
+from benchmarks.sweep.task import tasks_of
+from benchmarks.tables.by_method import table_of
+from benchmarks.tables.comparison import SUITE as COMPARISON
+from benchmarks.tables.comparison import comparison_claims, comparison_table
+from benchmarks.tables.extremes import extremes_table
+from benchmarks.tables.jacobians import jacobian_table
 
 
 def print_sweep(

@@ -4,10 +4,10 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.arm_drawing import draw_obstacles, draw_postures, metres
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, held, label, sheet
 from benchmarks.mpc.arm_loop import CORRECTION, DT, INSTANTANEOUS, loop
+from benchmarks.pictures.arm_drawing import draw_obstacles, draw_postures, metres
 from ocp import Rollout, Status, solve
 from solvers import MultipleShooting
 

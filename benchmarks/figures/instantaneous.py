@@ -6,11 +6,11 @@ import casadi as ca
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.animation import animate
-from benchmarks.arm_drawing import draw_obstacles, draw_postures, metres
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, label, sheet
-from benchmarks.tuned_kinematics import instantaneous
+from benchmarks.methods.tuned_kinematics import instantaneous
+from benchmarks.pictures.animation import animate
+from benchmarks.pictures.arm_drawing import draw_obstacles, draw_postures, metres
 from models import ArmScenario, link_distances
 from ocp import evaluate
 from solvers import KinematicRun, PrioritisedKinematics, Repulsion

@@ -7,8 +7,8 @@ import numpy as np
 
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import COLOURS, FINITE, Drawing, label, sheet
-from benchmarks.thesis_methods import LARGE, SMALL, best_shot
-from benchmarks.tuned_kinematics import tuned_kinematics
+from benchmarks.methods.thesis import LARGE, SMALL, best_shot
+from benchmarks.methods.tuned_kinematics import tuned_kinematics
 from models import ArmScenario
 from ocp import OCP, Solver, evaluate, solve
 from solvers import MultipleShooting, Schuetz, multistart, polish

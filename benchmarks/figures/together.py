@@ -7,11 +7,11 @@ import casadi as ca
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.animation import animate
-from benchmarks.arm_drawing import draw_obstacles, draw_postures, metres
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, label, sheet
-from benchmarks.tuned_kinematics import tuned_kinematics
+from benchmarks.methods.tuned_kinematics import tuned_kinematics
+from benchmarks.pictures.animation import animate
+from benchmarks.pictures.arm_drawing import draw_obstacles, draw_postures, metres
 from models import ArmScenario, link_distances
 from ocp import Solution, evaluate, solve
 from solvers import IndirectShooting, MultipleShooting, Schuetz, polish

@@ -1,9 +1,9 @@
 """Problems in which nothing is wrong: what a diagnosis must be silent on."""
 
 from benchmarks.cases import arm_scenario
-from benchmarks.greedy_gap import mass_regulator
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Sound
+from benchmarks.questions.greedy_gap import mass_regulator
 from models import (
     bryson_denham,
     discrete_double_integrator,

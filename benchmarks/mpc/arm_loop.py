@@ -14,7 +14,7 @@ from functools import cache, partial
 import casadi as ca
 import numpy as np
 
-from benchmarks.tuned_kinematics import instantaneous, tuned_kinematics
+from benchmarks.methods.tuned_kinematics import instantaneous, tuned_kinematics
 from models import ArmScenario, DistanceCost, Path, redundancy_ocp
 from ocp import MPC, OCP, Applied, Box, Law, Plant, Rollout, Solution, Solver, closed_loop, solve
 from solvers import (

@@ -13,7 +13,7 @@ from benchmarks.peers.jobs import NamedJob
 from benchmarks.peers.ours import own_contenders
 from benchmarks.peers.peer import Peer
 from benchmarks.peers.race import COLD_SOLVES, race
-from benchmarks.row import machine
+from benchmarks.sweep.row import machine
 
 
 def compare(

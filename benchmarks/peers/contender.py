@@ -14,7 +14,7 @@ from benchmarks.peers.environment import Environment
 from benchmarks.peers.export import exported
 from benchmarks.peers.job import Job, Situation
 from benchmarks.peers.peer import Peer
-from benchmarks.row import versions
+from benchmarks.sweep.row import versions
 from ocp import Guess, Program, Solution, Solver, Status, UnsupportedProblem
 
 # Time for an answer [s]: to build a job, which may compile, and to solve it once.

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks import linear_speed
 from benchmarks.cases.arm import arm_scenario
 from benchmarks.peers.job import Job, Situation
+from benchmarks.speed import linear as linear_speed
 from models import cart_pole_swing_up, cart_pole_upright, mass_spring_damper
 from ocp import OCP, RK4, Guess, Stage
 from solvers import MultipleShooting

@@ -10,7 +10,7 @@ from benchmarks.peers.conversation import PeerFailed
 from benchmarks.peers.entry import Entry
 from benchmarks.peers.environment import NotInstalled
 from benchmarks.peers.job import Job
-from benchmarks.row import FEASIBLE
+from benchmarks.sweep.row import FEASIBLE
 from ocp import evaluate
 
 COLD_SOLVES = 5

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from benchmarks.peers.entry import Entry, Report
-from benchmarks.row import FEASIBLE
+from benchmarks.sweep.row import FEASIBLE
 
 _COLUMNS = (
     "who",

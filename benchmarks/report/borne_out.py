@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from benchmarks.claims import below_reference, claims_of
-from benchmarks.comparison import comparison_claims
+from benchmarks.claims.every import below_reference, claims_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.sheet import Sheet
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
+from benchmarks.tables.comparison import comparison_claims
 
 
 def borne_out(rows: Sequence[Row]) -> Section:

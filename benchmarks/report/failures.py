@@ -7,7 +7,7 @@ from benchmarks.report.level import LOW
 from benchmarks.report.section import Block, Section, Text
 from benchmarks.report.sheet import Sheet
 from benchmarks.report.success import claims
-from benchmarks.row import CRASHED, TIMED_OUT, Row
+from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
 from ocp import Status
 
 _LOST = {

@@ -8,7 +8,7 @@ from benchmarks.report.rows import Part, parts_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.sheet import Sheet
 from benchmarks.report.strips import strips
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 _GAPS = (1e-10, 1e4)
 _VIOLATIONS = (1e-16, 1e4)

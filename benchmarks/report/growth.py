@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from benchmarks.report.plot import Legend, Plot, as_series, colour, dashes, drawn, powers_of_ten
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.sheet import Sheet
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 # (size, time of an iteration [s]), sorted by size.
 Curve = list[tuple[int, float]]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from benchmarks.row import FEASIBLE, SAME_OPTIMUM, Row
+from benchmarks.sweep.row import FEASIBLE, SAME_OPTIMUM, Row
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from benchmarks.report.section import Points, Section
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 _ALWAYS = (
     "The problems are those of one library, most of them arms that follow a line: a method that "

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from benchmarks.report.section import Block, Section, Text
 from benchmarks.report.sheet import Sheet
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 
 def overview(rows: Sequence[Row]) -> Section:

@@ -15,7 +15,7 @@ from benchmarks.report.profiles import profiles
 from benchmarks.report.reaching import reaching
 from benchmarks.report.section import Section
 from benchmarks.report.success import share, success
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 SECTIONS: tuple[Callable[[Sequence[Row]], Section], ...] = (
     overview,

@@ -7,7 +7,7 @@ from benchmarks.report.plot import Plot
 from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.steps import staircases
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 Setting = tuple[str, str, int, int]
 

@@ -7,7 +7,7 @@ from benchmarks.report.plot import Plot
 from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.steps import staircases
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 _HOW = (
     "The share of a method's rows that end within a gap of the reference, over the time that "

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 
 TICK = 1e-6  # [s]
 # Suites whose cases come with either distance cost, which differ in how hard they are.

@@ -6,7 +6,7 @@ from benchmarks.report.level import LEVELS, LOW, Level
 from benchmarks.report.rows import Part, parts_of
 from benchmarks.report.section import Block, Section, Text
 from benchmarks.report.sheet import Cell, Sheet
-from benchmarks.row import Row
+from benchmarks.sweep.row import Row
 from ocp import Status
 
 _HOW = (

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable
 
 from benchmarks.cases import Case
-from benchmarks.child import work
-from benchmarks.method import Method, Outcome, Settings, judged
+from benchmarks.methods.method import Method, Outcome, Settings, judged
+from benchmarks.sweep.child import work
 from ocp import solve
 from solvers import MultipleShooting
 

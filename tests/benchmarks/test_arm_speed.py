@@ -2,9 +2,9 @@
 
 import pytest
 
-from benchmarks.arm_speed import Steps, arm, arm_steps, exponent
-from benchmarks.arm_speed_tables import growth_table, ratio_table
-from benchmarks.driver_overhead import driver_overhead, overhead_line
+from benchmarks.speed.arm import Steps, arm, arm_steps, exponent
+from benchmarks.speed.arm_tables import growth_table, ratio_table
+from benchmarks.speed.driver_overhead import driver_overhead, overhead_line
 from solvers import Schuetz
 
 

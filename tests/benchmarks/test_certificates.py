@@ -5,8 +5,8 @@ import json
 import pytest
 
 from benchmarks.cases import LIBRARY, Case
+from benchmarks.cases.library.certificates import COMMITTED, Certificates, committed
 from benchmarks.cases.library.entry import certified
-from benchmarks.certificates import COMMITTED, Certificates, committed
 from solvers.certify.certify import OTHER_DIGITS, SMOOTH_DIGITS
 
 ENTRIES = committed().entries

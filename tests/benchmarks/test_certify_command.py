@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.cases import all_cases
-from benchmarks.certificates import Certificates
-from benchmarks.row import versions
+from benchmarks.cases.library.certificates import Certificates
+from benchmarks.sweep.row import versions
 from solvers import Certificate, Check, Estimate, MultipleShooting, Verdict
 
 

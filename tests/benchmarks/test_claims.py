@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.cases import arm_cases
-from benchmarks.claims import below_reference, claims_of
-from benchmarks.extremes import extremes_table
-from benchmarks.jacobians import jacobian_table
-from benchmarks.row import Row
-from benchmarks.table import table_of
+from benchmarks.claims.every import below_reference, claims_of
+from benchmarks.sweep.row import Row
+from benchmarks.tables.by_method import table_of
+from benchmarks.tables.extremes import extremes_table
+from benchmarks.tables.jacobians import jacobian_table
 
 CASE = arm_cases()[0]
 

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.cases import arm_scenario, required_clearance, soft_optimum
-from benchmarks.clear_motions import clear_motions, widest_clearance
+from benchmarks.questions.clear_motions import clear_motions, widest_clearance
 from models import ArmScenario, link_distances, random_scenarios
 from ocp import ProblemError, Status, evaluate, solve
 from solvers import BetweenNodes, MultipleShooting

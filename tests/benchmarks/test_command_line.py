@@ -5,9 +5,9 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.cases import all_cases
 from benchmarks.commands.bench import BENCH_CASES, BENCH_METHODS
-from benchmarks.methods import all_methods
-from benchmarks.pictures import bench_picture
-from benchmarks.row import RESULTS
+from benchmarks.methods.every import all_methods
+from benchmarks.pictures.main_job import bench_picture
+from benchmarks.sweep.row import RESULTS
 
 
 def test_list_names_every_suite_and_solver(capsys):

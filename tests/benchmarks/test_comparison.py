@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_parts, arm_scenario, comparison_cases, link_cases
-from benchmarks.comparison import comparison_claims, comparison_table
 from benchmarks.figures import over_horizon, over_links
-from benchmarks.many_kinematics import ManyKinematics
-from benchmarks.tuned_kinematics import candidates, instantaneous
+from benchmarks.methods.many_kinematics import ManyKinematics
+from benchmarks.methods.tuned_kinematics import candidates, instantaneous
+from benchmarks.tables.comparison import comparison_claims, comparison_table
 from ocp import evaluate
 from tests.benchmarks.test_claims import row
 

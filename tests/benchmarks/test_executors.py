@@ -6,11 +6,11 @@ from collections.abc import Iterator
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.executors import Execution
-from benchmarks.guard import SweepError
-from benchmarks.row import RESULTS
-from benchmarks.rows_file import read_rows
-from benchmarks.sweep import sweep
+from benchmarks.sweep.executors import Execution
+from benchmarks.sweep.guard import SweepError
+from benchmarks.sweep.row import RESULTS
+from benchmarks.sweep.rows_file import read_rows
+from benchmarks.sweep.sweep import sweep
 from tests.benchmarks.test_sweep import DIRECT, QUICK, SMALL
 
 distributed = pytest.importorskip("distributed")

@@ -2,10 +2,10 @@
 
 import pytest
 
-from benchmarks.guard import Group, SweepError, run_group
-from benchmarks.method import Settings
-from benchmarks.row import CRASHED, TIMED_OUT, Row
-from benchmarks.task import Task
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.guard import Group, SweepError, run_group
+from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
+from benchmarks.sweep.task import Task
 from tests.benchmarks.test_sweep import QUICK
 
 

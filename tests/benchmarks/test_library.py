@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import LIBRARY, Case, Published, Reference, all_cases
-from benchmarks.claims import below_reference
-from benchmarks.library_claims import library_claims, tolerance_of, within
-from benchmarks.library_methods import library_methods
-from benchmarks.library_table import library_table
-from benchmarks.library_tolerances import INTERVALS, USUAL
-from benchmarks.method import Settings
-from benchmarks.row import Row
+from benchmarks.cases.library.table import library_table
+from benchmarks.claims.every import below_reference
+from benchmarks.claims.library import library_claims, tolerance_of, within
+from benchmarks.methods.library import library_methods
+from benchmarks.methods.library_tolerances import INTERVALS, USUAL
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.row import Row
 from ocp import ProblemError, evaluate, solve
 from solvers import MultipleShooting, polish
 
@@ -138,6 +138,7 @@ def test_a_failed_minimiser_is_a_bad_verdict() -> None:
 
 
 def test_the_page_holds_the_table() -> None:
-    """``python -c "from benchmarks.library_table import *; print(library_table())"`` renews it."""
+    """``python -c "from benchmarks.cases.library.table import *
+    print(library_table())"`` renews it."""
     page = (Path(__file__).parents[2] / "docs" / "library.md").read_text(encoding="utf-8")
     assert library_table() in page

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.greedy_gap import PROBLEMS, gap
-from benchmarks.linear_speed import Growth, situations
+from benchmarks.questions.greedy_gap import PROBLEMS, gap
+from benchmarks.speed.linear import Growth, situations
 
 
 def test_speed_prints_growth(capsys):

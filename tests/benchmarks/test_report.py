@@ -10,7 +10,7 @@ from urllib.parse import unquote
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.method import Settings
+from benchmarks.methods.method import Settings
 from benchmarks.report import report_page
 from benchmarks.report.growth import exponent
 from benchmarks.report.level import LEVELS, LOW
@@ -21,8 +21,8 @@ from benchmarks.report.profiles import ratios_to_best
 from benchmarks.report.section import Points
 from benchmarks.report.sheet import SHOWN, Sheet
 from benchmarks.report.success import share
-from benchmarks.row import RESULTS, TIMED_OUT, Row
-from benchmarks.task import Task
+from benchmarks.sweep.row import RESULTS, TIMED_OUT, Row
+from benchmarks.sweep.task import Task
 from tests.benchmarks.chromium import CHROMIUM, opened
 from tests.benchmarks.test_claims import row as arm_row
 

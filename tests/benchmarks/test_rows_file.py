@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from benchmarks.method import Settings
-from benchmarks.row import CRASHED, RESULTS, OtherVersion, Row
-from benchmarks.rows_file import mend, prepare, read_found, read_rows
-from benchmarks.task import Task
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.row import CRASHED, RESULTS, OtherVersion, Row
+from benchmarks.sweep.rows_file import mend, prepare, read_found, read_rows
+from benchmarks.sweep.task import Task
 
 
 def lost(case: str) -> Row:

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import all_cases, arm_cases
-from benchmarks.method import Settings
-from benchmarks.methods import all_methods
-from benchmarks.row import CRASHED, RESULTS, Row
-from benchmarks.rows_file import read_rows
-from benchmarks.sweep import sweep
-from benchmarks.task import groups_of, tasks_of
+from benchmarks.methods.every import all_methods
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.row import CRASHED, RESULTS, Row
+from benchmarks.sweep.rows_file import read_rows
+from benchmarks.sweep.sweep import sweep
+from benchmarks.sweep.task import groups_of, tasks_of
 
 PROMISED = {
     "suite", "case", "solver", "settings", "seed", "status", "solved", "cost", "reference", "gap",

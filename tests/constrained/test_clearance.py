@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import all_cases, arm_scenario, required_clearance, soft_optimum
-from benchmarks.claims import claims_of
-from benchmarks.clearance import clearance_methods
-from benchmarks.clearance_claims import clearance_claims
-from benchmarks.method import Settings
-from benchmarks.row import Row
+from benchmarks.claims.clearance import clearance_claims
+from benchmarks.claims.every import claims_of
+from benchmarks.methods.clearance import clearance_methods
+from benchmarks.methods.method import Settings
+from benchmarks.sweep.row import Row
 from models import link_distances, seven_links
 from ocp import Solver, Status, evaluate, solve
 from solvers import AugmentedLagrangian, BetweenNodes, MultipleShooting, Schuetz, polish

@@ -4,10 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks.animation import animate
 from benchmarks.cases import all_cases, arm_scenario
 from benchmarks.figures import chosen, draw_all
-from benchmarks.tuned_kinematics import OFF_PATH, candidates, tuned_kinematics
+from benchmarks.methods.tuned_kinematics import OFF_PATH, candidates, tuned_kinematics
+from benchmarks.pictures.animation import animate
 from models import Capsule, Disc, PlanarArm, Polygon
 from ocp import evaluate
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from benchmarks.cases.case import Case, Difficulty, Family, Published, Reference
-from benchmarks.certificates import committed
+from benchmarks.cases.library.certificates import committed
 from ocp import OCP
 
 SUITE = "library"

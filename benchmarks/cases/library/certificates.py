@@ -1,0 +1,63 @@
+"""The file of certificates: committed data, and the references of the library."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+COMMITTED = Path(__file__).parents[2] / "data" / "certificates.json"
+
+
+@dataclass(frozen=True)
+class Certificates:
+    """What is on file.
+
+    Attributes:
+        versions: of what computed.
+        entries: by name of the case, as ``Certificate.as_dict`` has them.
+    """
+
+    versions: Mapping[str, str] = field(default_factory=dict)
+    entries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, file: Path) -> "Certificates":
+        """Read a file; nothing where there is none.
+
+        Raises:
+            ValueError: if it is no file of certificates.
+        """
+        if not file.exists():
+            return cls()
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+            return cls(content["versions"], content["cases"])
+        except (OSError, ValueError, KeyError, TypeError) as reason:
+            raise ValueError(f"{file} is no file of certificates: {reason!r}") from None
+
+    def with_(
+        self, case: str, entry: Mapping[str, Any], versions: Mapping[str, str]
+    ) -> "Certificates":
+        """Return them with one more, or one anew, and with what computed it.
+
+        A certificate that holds is not given up for one that does not.
+        """
+        if self.entries.get(case, {}).get("holds") and not entry["holds"]:
+            return self
+        return Certificates(versions, dict(sorted({**self.entries, case: entry}.items())))
+
+    def write(self, file: Path) -> None:
+        """Write them in one piece, so that a killed run leaves the old file or the new one."""
+        content = {"versions": dict(self.versions), "cases": dict(self.entries)}
+        file.parent.mkdir(parents=True, exist_ok=True)
+        draft = file.with_suffix(".new")
+        draft.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        draft.replace(file)
+
+
+@cache
+def committed() -> Certificates:
+    """Return the certificates that the library stands on."""
+    return Certificates.read(COMMITTED)

@@ -1,0 +1,1 @@
+"""What the toolkit claims of itself, checked against the rows of a run."""

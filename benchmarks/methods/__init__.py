@@ -1,0 +1,1 @@
+"""What is compared: solvers with the start they are given."""

@@ -1,0 +1,1 @@
+"""What the arm and its costs look like."""

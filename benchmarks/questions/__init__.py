@@ -1,0 +1,1 @@
+"""Open questions of the thesis, decided by a computation of their own."""

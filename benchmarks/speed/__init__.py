@@ -1,0 +1,1 @@
+"""What a step of MPC costs, as ratios in one run."""

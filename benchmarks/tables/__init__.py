@@ -1,0 +1,1 @@
+"""Rows condensed to tables."""
