@@ -49,10 +49,11 @@ def _chosen(options: Namespace, console: Console) -> int:
 def _faults_options(parser: ArgumentParser) -> None:
     parser.add_argument("--steps", type=positive, default=2000, metavar="K")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=positive, default=1, metavar="W", help="processes")
 
 
 def _faults(options: Namespace, console: Console) -> int:
-    return print_faults(console, options.steps, options.seed)
+    return print_faults(console, options.steps, options.seed, options.workers)
 
 
 MPC = Command("mpc", "closed loops over the horizon, and other plants", _mpc_options, _mpc)

@@ -28,7 +28,7 @@ def _grids(case: Case) -> tuple[int, int]:
     return INTERVALS.get(case.difficulty, USUAL)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=64)  # the whole library, for all methods of one process
 def _coarse(case: Case) -> Solution:
     """The direct answer that other methods begin with."""
     return solve(problem(case), MultipleShooting(_grids(case)[0]))

@@ -1,9 +1,14 @@
 """``python -m benchmarks mpc`` and ``faults``."""
 
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import reduce
+from multiprocessing import get_context
+from operator import add
 from pathlib import Path
 
 from rich.console import Console
+from rich.progress import Progress
 
 from benchmarks.cases import arm_scenario
 from benchmarks.mpc import cart_pole_loop as cart_pole
@@ -95,9 +100,21 @@ SHORT = {
 }
 
 
-def print_faults(console: Console, steps: int, seed: int) -> int:
-    """Run the campaign and print it; return 0 if it is clean."""
-    reports = [campaign(name, max(1, round(_SHARES[name] * steps)), seed=seed) for name in SUBJECTS]
+def print_faults(console: Console, steps: int, seed: int, workers: int = 1) -> int:
+    """Run the campaign in processes of this machine and print it; return 0 if it is clean."""
+    shares = {name: max(1, round(_SHARES[name] * steps)) for name in SUBJECTS}
+    reports = []
+    with (
+        ProcessPoolExecutor(workers, get_context("spawn")) as pool,
+        Progress(console=console, transient=True) as bar,
+    ):
+        for name, share in shares.items():
+            task = bar.add_task(f"{name}, {share} steps", total=share)
+            pieces = []
+            for piece in campaign(name, share, seed=seed, executor=pool):
+                bar.advance(task, piece.steps)
+                pieces.append(piece)
+            reports.append(reduce(add, pieces))
     for report in reports:
         console.print(faults_table(report))
         console.print(said(report))

@@ -1,8 +1,11 @@
 """The fault campaign: whatever fails, every input is one that may be sent to a robot."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -64,13 +67,23 @@ class Report:
         )
 
 
-def campaign(subject: str, steps: int, *, seed: int = 0) -> Report:
-    """Run the loop for a number of steps, in pieces with their own random numbers."""
-    pieces = [min(PIECE, steps - first) for first in range(0, steps, PIECE)]
-    total = _piece(subject, pieces[0], seed)
-    for k, count in enumerate(pieces[1:], start=1):
-        total += _piece(subject, count, seed + k)
-    return total
+def campaign(
+    subject: str, steps: int, *, seed: int = 0, executor: Executor | None = None
+) -> Iterator[Report]:
+    """Run the loop for a number of steps, in pieces with their own random numbers.
+
+    Args:
+        subject: of ``SUBJECTS``.
+        steps: in all.
+        seed: of the first piece; the others have the next ones.
+        executor: where pieces run, several at once; None: here, one after the other.
+
+    Yields:
+        The report of each piece when it is ready; their sum is that of the campaign.
+    """
+    counts = [min(PIECE, steps - first) for first in range(0, steps, PIECE)]
+    run = executor.map if executor else map
+    yield from run(partial(_piece, subject), counts, count(seed))
 
 
 def _piece(name: str, steps: int, seed: int) -> Report:

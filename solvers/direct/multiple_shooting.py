@@ -45,6 +45,9 @@ class MultipleShooting(Solver):
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
+        rescue: where the search fails, look for the least violating trajectory: it tells an
+            infeasible problem from a lost search and is a better start for a second one. It may
+            cost 300 iterations; a controller that has to answer in time does without.
     """
 
     intervals: int = 75
@@ -55,6 +58,7 @@ class MultipleShooting(Solver):
     accuracy: float = 1e-2
     verbose: bool = False
     compiled: bool = False
+    rescue: bool = True
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -112,7 +116,13 @@ class MultipleShootingProgram(Program):
     def search(self) -> Search:
         """The backend, and what is done around it."""
         solver = self.solver
-        return Search(self.transcription, solver.options, solver.accuracy, self._integration_error)
+        return Search(
+            transcription=self.transcription,
+            options=solver.options,
+            accuracy=solver.accuracy,
+            error=self._integration_error,
+            rescue=solver.rescue,
+        )
 
     # -- the first iterate -------------------------------------------------------------------
 

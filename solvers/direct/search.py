@@ -71,12 +71,14 @@ class Search:
         options: of the backend.
         accuracy: the largest accepted error of a state.
         error: (answer, data) -> error of a state relative to 1 + abs(x), and at which instant.
+        rescue: whether a failure is followed by a search for the least violating trajectory.
     """
 
     transcription: Transcribed
     options: Backend
     accuracy: float
     error: Callable[[Answer, Data], tuple[float, int]]
+    rescue: bool = True
 
     @cached_property
     def nlp(self) -> Nlp:
@@ -100,7 +102,8 @@ class Search:
             # second run comes back at once.
             answers.append(self.nlp.solve(self._kicked(answers[-1], bounds), p, bounds))
             status, message = self._verdict(answers[-1], data, bounds)
-        if status in _MAYBE_INFEASIBLE and (ocp.constraints or ocp.state_bounds.is_active):
+        constrained = bool(ocp.constraints) or ocp.state_bounds.is_active
+        if self.rescue and constrained and status in _MAYBE_INFEASIBLE:
             found = self._feasibility.least_violating(w0, bounds, p)
             if found:
                 answers.append(found[0])

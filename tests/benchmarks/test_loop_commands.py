@@ -78,7 +78,7 @@ def test_whatever_a_campaign_finds_is_said_and_is_no_success(
     what: str, capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = replace(CLEAN, **{what: 2})
-    monkeypatch.setattr(commands, "campaign", lambda name, steps, seed: found)
+    monkeypatch.setattr(commands, "campaign", lambda name, steps, **_: iter([found]))
     assert main(["faults", "--steps", "10"]) == 1
     shown = capsys.readouterr().out
     assert "NOT CLEAN" in shown

@@ -144,6 +144,16 @@ def test_infeasible_names_constraint_and_time(name: str, solver: Solver) -> None
     stands_behind_nothing(solution)
 
 
+def test_without_rescue_a_failure_is_what_the_backend_says() -> None:
+    make, *_ = INFEASIBLE["unreachable end"]
+    quick = solve(make(), MultipleShooting(20, rescue=False))
+    assert quick.status is Status.FAILED
+    assert "Infeasible_Problem_Detected" in quick.message
+    thorough = solve(make(), MultipleShooting(20))
+    assert thorough.status is Status.INFEASIBLE
+    assert quick.iterations < thorough.iterations
+
+
 @direct
 def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(solver: Solver) -> None:
     """A start that is given is no unknown: from the first step on the answer is an optimum.
