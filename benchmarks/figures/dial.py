@@ -1,5 +1,7 @@
 """Fig. 3.19: the total cost over the horizon, between instantaneous control and the optimum."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from benchmarks.cases import arm_scenario
@@ -12,18 +14,18 @@ SCENARIO = "arm-001"
 _DRAWN = ("shooting", "schuetz")
 
 
-def total_costs() -> Drawing:
+def total_costs(horizons: Sequence[float] = HORIZONS) -> Drawing:
     """Draw both durations beside each other."""
     scenario = arm_scenario(SCENARIO)
     still = _row(INSTANTANEOUS, 0.0)
-    rows = {kind: [_row(kind, horizon) for horizon in HORIZONS] for kind in _DRAWN}
+    rows = {kind: [_row(kind, horizon) for horizon in horizons] for kind in _DRAWN}
     picture = sheet(12.0, 5.0)
-    columns: dict[str, np.ndarray] = {"horizon [s]": np.array(HORIZONS)}
+    columns: dict[str, np.ndarray] = {"horizon [s]": np.array(horizons)}
     for axes, part in zip(picture.subplots(1, 2), (True, False), strict=True):
         end = PART if part else scenario.horizon
         for kind, colour in zip(_DRAWN, (COLOURS[0], COLOURS[2]), strict=True):
             costs = np.array([_cost(row, part) for row in rows[kind]])
-            axes.plot(HORIZONS, costs, ".-", color=colour, label=f"MPC, {kind}")
+            axes.plot(horizons, costs, ".-", color=colour, label=f"MPC, {kind}")
             columns[f"{kind}, {end:g} s [rad²/s]"] = costs
         axes.axhline(_cost(still, part), color="tab:red", label="instantaneous, tuned")
         columns[f"instantaneous, {end:g} s [rad²/s]"] = np.array([_cost(still, part)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_parts, arm_scenario, comparison_cases, link_cases
-from benchmarks.figures import over_horizon, over_links
+from benchmarks.figures import over_horizon
 from benchmarks.methods.many_kinematics import ManyKinematics
 from benchmarks.methods.tuned_kinematics import candidates, instantaneous
 from benchmarks.tables.comparison import comparison_claims, comparison_table
@@ -75,12 +75,3 @@ def test_the_disparity_grows_with_the_horizon_if_the_step_is_too_large():
     assert large[0] < 0.1 < 10.0 < large[1]
     assert max(small) < 0.3
     assert max(sound) < 0.01
-
-
-@pytest.mark.slow
-def test_the_figure_over_the_links():
-    cases = [case for case in link_cases() if case.name in ("arm-03-links-0", "arm-05-links-0")]
-    drawing = over_links.links(cases)
-    assert list(drawing.columns["links [-]"]) == [3, 5]
-    assert np.nanmin(drawing.columns[f"gap, {over_links.DIRECT} [%]"]) >= 0.0
-    assert drawing.sentence.startswith("Fig. links: ")

@@ -46,7 +46,7 @@ def test_the_dial_prints_rows_and_crossings_and_runs_nothing_twice(tmp_path: Pat
 @pytest.mark.slow
 def test_the_short_tables_are_printed(capsys) -> None:
     words = ["mpc", "--short", "endings", "delay", "mass", "--scenarios", "arm-004"]
-    assert main([*words, "--horizons", "0.2"]) == 0
+    assert main([*words, "--horizons", "0.1"]) == 0
     shown = capsys.readouterr().out
     for word in ("terminal costs", "lingering", "previous", "computing delay of 40 ms", "not comp"):
         assert word in shown
