@@ -145,7 +145,7 @@ def test_discrete_gradient(integrator, make: Callable[[], OCP]) -> None:
 
     def cost(controls: np.ndarray) -> float:
         schedule = [times, np.full((1, n), h), left.T, right.T]
-        x, costs = program.rollout(data.x0, controls[None, :], *schedule)
+        x, costs = program.sweeps.forwards(data.x0, controls[None, :], *schedule)
         end = ocp.functions.terminal_cost(x[:, -1], ocp.duration, data.values.at(1.0)[0])
         return float(ca.sum2(costs)) + float(end)
 
