@@ -173,7 +173,7 @@ class _Descent:
     def descend(self) -> tuple[Status, str]:
         """Iterate until a termination test holds; return which, with what there is to say."""
         if not self.here.is_finite:
-            return Status.DIVERGED, "the first controls make the state blow up"
+            return Status.DIVERGED, "the first controls make the state or its costate blow up"
         objective, last = self.objective, None
         for _ in range(self.solver.max_iterations):
             if self.is_stationary:

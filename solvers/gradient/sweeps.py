@@ -35,7 +35,7 @@ class Iterate:
     @property
     def is_finite(self) -> bool:
         """Whether neither the state nor its costate blew up."""
-        return bool(np.isfinite(self.trial.cost) and np.isfinite(self.gradient).all())
+        return bool(np.isfinite(self.trial.cost))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +113,23 @@ class Objective:
         return Trial(u, x, cost if np.isfinite(cost) and np.isfinite(x).all() else np.inf)
 
     def differentiated(self, trial: Trial) -> Iterate:
-        """Integrate (3.62) backwards along a trial; at rest where it blew up."""
+        """Integrate (3.62) backwards along a trial; at rest where either way blew up."""
         if not np.isfinite(trial.cost):
-            still = np.tile(self.data.x0, (len(trial.x), 1))
-            rest = Trial(trial.u, still, np.inf)
-            return Iterate(rest, np.zeros_like(still), np.zeros_like(trial.u))
+            return self._at_rest(trial.u)
         final = self.sweeps.final_gradient(trial.x[-1], *self._end)[0].ravel()
         after = [] if self.sweeps.exact else [trial.x[1:].T]
         along = [trial.x[:-1].T, *after, trial.u.T, *self._schedule]
         costate, gradient = self.sweeps.backwards(final, *(a[:, ::-1] for a in along))
         self.backward += 1
-        return Iterate(trial, np.vstack([costate.T[::-1], final]), gradient.T[::-1] / self.h)
+        costate = np.vstack([costate.T[::-1], final])
+        if not (np.isfinite(costate).all() and np.isfinite(gradient).all()):
+            return self._at_rest(trial.u)
+        return Iterate(trial, costate, gradient.T[::-1] / self.h)
+
+    def _at_rest(self, u: np.ndarray) -> Iterate:
+        """What there is to show of controls along which something blows up."""
+        still = np.tile(self.data.x0, (self.sweeps.n + 1, 1))
+        return Iterate(Trial(u, still, np.inf), np.zeros_like(still), np.zeros_like(u))
 
     def free_gradient(self, iterate: Iterate) -> np.ndarray:
         """The gradient, without components that would only push into a bound."""

@@ -286,5 +286,14 @@ def test_a_first_guess_that_blows_up() -> None:
     assert np.isfinite(solution.x).all()
 
 
+@pytest.mark.parametrize("gradient", ["continuous", "discrete"])
+def test_a_costate_that_blows_up_where_the_cost_does_not(gradient: Any) -> None:
+    """sqrt(x) has no slope at 0, where the point stays without control."""
+    ocp = point(terminal_cost=lambda x, u: ca.sqrt(x))
+    solution = solve(ocp, Schuetz(gradient=gradient))
+    assert solution.status is Status.DIVERGED
+    assert "costate" in solution.message
+
+
 def test_armijo_is_a_step_rule() -> None:
     assert Schuetz.sound().step == Armijo()
