@@ -20,11 +20,11 @@ from ocp import (
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot
 from solvers.indirect.crossings import Condition, Crossings, is_transversal, meets_start
-from solvers.indirect.extremal import Schedule
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.manifold import Kept, Manifold, redundant_by_one
 from solvers.indirect.reverse import Reverse
 from solvers.indirect.scan import Scan, Scanner
+from solvers.indirect.segments import Schedule
 from solvers.indirect.self_motion import seeds_around, self_motions
 
 # Of the scan: enough to find a root that Newton, with its own steps, then makes exact.

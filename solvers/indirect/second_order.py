@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.indirect.extremal import Extremals, Paths, Schedule
+from solvers.indirect.extremal import Extremals
+from solvers.indirect.segments import Paths, Schedule
 
 # Columns of the Lagrangian plane this close to dependent count as a conjugate point.
 _SINGULAR = 1e-9
