@@ -36,7 +36,12 @@ class Row:
 def rows_of(
     constraints: Iterable[Constraint], place: Literal["path", "initial", "terminal"]
 ) -> list[Row]:
-    """Return the rows of constraints, one for each component, at node 0."""
+    """Return the rows of constraints, one for each component, at node 0.
+
+    Args:
+        constraints: in their order in g.
+        place: where all of them hold.
+    """
     return [
         Row(c.name, place, 0, float(low), float(high))
         for c in constraints
