@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 
@@ -33,8 +32,8 @@ class Extremals:
     steps: int
     roll: Buffered
     slopes: Buffered
-    ends: ca.Function
-    starts: ca.Function
+    ends: Buffered
+    starts: Buffered
 
     @classmethod
     def of(
@@ -51,7 +50,7 @@ class Extremals:
             step, slope = compiled(step), compiled(slope)
         roll = Buffered(step.mapaccum(steps).map(segments))
         slopes = Buffered(slope.map(segments * steps))
-        return cls(ocp, optimality, shape, steps, roll, slopes, ends, starts)
+        return cls(ocp, optimality, shape, steps, roll, slopes, Buffered(ends), Buffered(starts))
 
     # -- the boundary value problem --------------------------------------------------------
 
@@ -63,7 +62,7 @@ class Extremals:
         paths = self.paths(z, schedule, duration)
         end = self.ends(paths.ends[-1], nu, schedule.t0 + duration, schedule.p_last)[0]
         parts = [self._start(z[0], mu, schedule, x0)[0], (paths.ends[:-1] - z[1:]).ravel(), end]
-        return np.concatenate([np.array(part, dtype=float).ravel() for part in parts]), paths
+        return np.concatenate([part.ravel() for part in parts]), paths
 
     def paths(self, z: np.ndarray, schedule: Schedule, duration: float) -> Paths:
         """Integrate every segment from its start."""
@@ -106,9 +105,7 @@ class Extremals:
         s, size = self.shape.segments, 2 * self.shape.nx
         in_z, in_time = slopes
         t = schedule.t0 + duration
-        _, end_z, end_nu, end_t = (
-            np.array(a) for a in self.ends(paths.ends[-1], nu, t, schedule.p_last)
-        )
+        _, end_z, end_nu, end_t = self.ends(paths.ends[-1], nu, t, schedule.p_last)
         start_z, start_mu = self._start(z[0], mu, schedule, x0)[1:]
         blocks: list[list] = [[None] * (s + 3) for _ in range(s + 1)]
         blocks[0][0], blocks[0][s] = start_z, start_mu
@@ -149,8 +146,7 @@ class Extremals:
         self, z: np.ndarray, mu: np.ndarray, schedule: Schedule, x0: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.ocp.has_free_start:
-            answer = self.starts(z, mu, schedule.t0, schedule.p_first)
-            value, in_z, in_mu = (np.array(a) for a in answer)
+            value, in_z, in_mu = self.starts(z, mu, schedule.t0, schedule.p_first)
             return value.ravel(), in_z, in_mu
         nx = self.shape.nx
         return z[:nx] - x0, np.eye(nx, 2 * nx), np.empty((nx, 0))

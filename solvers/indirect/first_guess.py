@@ -33,9 +33,8 @@ def _balancing(
     """Return the multipliers that best balance the costates of z at both ends."""
     shape, nx = extremals.shape, extremals.shape.nx
     mu, nu, t1 = np.zeros(shape.n_mu), np.zeros(shape.n_nu), schedule.t0 + duration
-    at_start = extremals.starts(z[0], mu, schedule.t0, schedule.p_first)
-    value, _, in_mu = (np.array(a) for a in at_start)
+    value, _, in_mu = extremals.starts(z[0], mu, schedule.t0, schedule.p_first)
     mu = -np.linalg.lstsq(in_mu[-nx:], value[-nx:].ravel(), rcond=None)[0]
-    value, _, in_nu, _ = (np.array(a) for a in extremals.ends(z[-1], nu, t1, schedule.p_last))
+    value, _, in_nu, _ = extremals.ends(z[-1], nu, t1, schedule.p_last)
     nu = -np.linalg.lstsq(in_nu[:nx], value[:nx].ravel(), rcond=None)[0]
     return mu, nu
