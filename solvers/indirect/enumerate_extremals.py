@@ -126,6 +126,11 @@ def enumerate_extremals(
     guesses = [_guess(reverse, schedule, start, row, data.x0) for row in ends]
     solver = solver or IndirectShooting(_SEGMENTS, _FINE_STEPS, max_steps=_NEWTON_STEPS)
     found = list(_exact(solver.build(ocp), data, guesses))
+    return _enumeration(found, scans)
+
+
+def _enumeration(found: list[Solution], scans: tuple[Scan, ...]) -> Enumeration:
+    """Return the distinct extremals among those found, the cheapest first."""
     solutions = _distinct([solution for solution in found if solution.status.is_success])
     judged = np.array([evaluate(solution).cost for solution in solutions])
     order = np.argsort(judged, kind="stable")
