@@ -107,7 +107,12 @@ class ManipulabilityCost(PostureCost):
 
 
 def squared_manipulability(arm: PlanarArm, theta: ca.SX) -> ca.SX:
-    """Return w² = det(JJ') [m⁴], zero at a singularity, smooth everywhere."""
+    """Return w² = det(JJ') [m⁴], zero at a singularity, smooth everywhere.
+
+    Args:
+        arm: the arm, n links.
+        theta: configuration (n,) [rad].
+    """
     jacobian = arm.jacobian(theta)
     first, second = jacobian[0, :], jacobian[1, :]
     return ca.sumsqr(first) * ca.sumsqr(second) - ca.dot(first, second) ** 2

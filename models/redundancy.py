@@ -1,7 +1,7 @@
 """Kinematic control of a redundant arm as an optimal control problem."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import casadi as ca
@@ -124,14 +124,12 @@ def redundancy_ocp(
     theta = ca.SX.sym("theta", arm.n)
     error = arm.end_effector(theta) - target
     rate = path_velocity(path, t) - gain * error
-    motion = _motion(arm.jacobian(theta), rate, cost, form)
+    limits = velocity_bounds or Box()
+    motion = _motion(arm.jacobian(theta), rate, cost, form, limits)
     avoided = obstacles if distance_cost and k > 0.0 else ()
     avoidance = k * distance_cost.of(arm, theta, avoided) if distance_cost else ca.SX(0)
     posture = sum((term.of(arm, theta) for term in posture_costs), ca.SX(0))
-    constraints = [*motion.task]
-    if velocity_bounds and form == "null-space":
-        limits = velocity_bounds
-        constraints += [Constraint("joint velocity", motion.velocity, limits.lower, limits.upper)]
+    constraints = [*motion.constraints]
     if clearance is not None:
         constraints += [clearance_constraint(arm, theta, obstacles, clearance)]
     if free_start:
@@ -142,7 +140,7 @@ def redundancy_ocp(
         x0=start,
         horizon=duration,
         running_cost=avoidance + posture + motion.effort,
-        control_bounds=velocity_bounds if velocity_bounds and form == "velocity" else Box(),
+        control_bounds=motion.control_bounds,
         state_bounds=joint_bounds or Box(),
         constraints=tuple(constraints),
         invariants=(Constraint("task error", error, 0.0, 0.0),),
@@ -158,29 +156,30 @@ class _Motion:
     control: ca.SX
     velocity: ca.SX
     effort: ca.SX
-    task: tuple[Constraint, ...] = ()
+    control_bounds: Box = field(default_factory=Box)
+    constraints: tuple[Constraint, ...] = ()
 
 
-def _motion(jacobian: ca.SX, rate: ca.SX, cost: Cost, form: Form) -> _Motion:
-    """Return the plant that gives the end effector the velocity ``rate``."""
-    n = jacobian.shape[1]
+def _motion(jacobian: ca.SX, rate: ca.SX, cost: Cost, form: Form, limits: Box) -> _Motion:
+    """Return the plant that gives the end effector the velocity ``rate``, within ``limits``."""
     if form == "velocity":
-        v = ca.SX.sym("v", n)
-        return _Motion(
-            control=v,
-            velocity=v,
-            effort=ca.sumsqr(v),
-            task=(Constraint("task", ca.mtimes(jacobian, v) - rate, 0.0, 0.0),),
-        )
-    y = ca.SX.sym("y", n)
+        return _velocity_form(jacobian, rate, limits)
+    y = ca.SX.sym("y", jacobian.shape[1])
     # J# r' + N y = y + J'(JJ')^-1 (r' - J y): no n x n matrix is formed.
     missing = rate - ca.mtimes(jacobian, y)
     velocity = y + ca.mtimes(jacobian.T, _gram_solve(jacobian, missing))
     if cost == "raw":
-        return _Motion(control=y, velocity=velocity, effort=ca.sumsqr(velocity))
-    # |J# r'|^2 = r'' (JJ')^-1 r', free of y; the rest is y'y exactly.
-    least = ca.dot(rate, _gram_solve(jacobian, rate))
-    return _Motion(control=y, velocity=velocity, effort=least + ca.sumsqr(y))
+        effort = ca.sumsqr(velocity)
+    else:  # |J# rate|^2 = rate' (JJ')^-1 rate, free of y; the rest is y'y exactly.
+        effort = ca.dot(rate, _gram_solve(jacobian, rate)) + ca.sumsqr(y)
+    bound = Constraint("joint velocity", velocity, limits.lower, limits.upper)
+    return _Motion(y, velocity, effort, constraints=(bound,) if limits.is_active else ())
+
+
+def _velocity_form(jacobian: ca.SX, rate: ca.SX, limits: Box) -> _Motion:
+    v = ca.SX.sym("v", jacobian.shape[1])
+    task = Constraint("task", ca.mtimes(jacobian, v) - rate, 0.0, 0.0)
+    return _Motion(v, v, ca.sumsqr(v), control_bounds=limits, constraints=(task,))
 
 
 def _gram_solve(jacobian: ca.SX, vector: ca.SX) -> ca.SX:

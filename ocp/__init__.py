@@ -33,10 +33,11 @@ from ocp.parameters import Parameter, ParameterValues, Signal
 from ocp.pieces import Pieces, bernstein, elevated
 from ocp.problem import OCP, FreeTime
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
+from ocp.rows import Row, most_violated, rows_of
 from ocp.solution import Solution, Work
 from ocp.solver import Program, Solver, Start, solve
 from ocp.status import Status
-from ocp.transcription import Row, Transcription
+from ocp.transcription import Transcription
 
 __all__ = [
     "MPC",
@@ -106,10 +107,12 @@ __all__ = [
     "instantaneous",
     "interpolate",
     "linear_quadratic",
+    "most_violated",
     "numbers",
     "records",
     "replay",
     "replay_all",
+    "rows_of",
     "saturated_lqr",
     "solve",
     "stationary",

@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 class Buffered:
     """A Function with memory of its own for inputs and outputs: arrays in, new arrays out.
 
+    A ``ca.Function`` is what others are built from (symbols in, ``map``, derivatives); where
+    numbers go in again and again, a loop or an iteration calls it as ``Buffered``.
+
     An ordinary call with numpy arrays converts element by element: 0.2 ms for the arrays of 35
     stages that compiled code runs through in 0.04 ms. Not for several threads at once.
 

@@ -73,14 +73,32 @@ def numeric(values: ArrayLike, what: str) -> np.ndarray:
 
 
 def whole(value: object, what: str, *, least: int = 1) -> int:
-    """Return ``value`` if it is a whole number of at least ``least``, or raise ``ProblemError``."""
+    """Return ``value`` if it is a whole number of at least ``least``.
+
+    Args:
+        value: what a user gave.
+        what: how a message calls it.
+        least: smallest number allowed.
+
+    Raises:
+        ProblemError: otherwise, and for a bool or a float, naming ``what``.
+    """
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ProblemError(f"{what} must be a whole number of at least {least}, not {value!r}")
     return int(value)
 
 
 def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
-    """Raise ``ProblemError`` unless ``value`` is of a kind."""
+    """Check that ``value`` is of a kind.
+
+    Args:
+        value: what a user gave.
+        kind: class, or classes, that it may be of.
+        what: how a message calls it.
+
+    Raises:
+        ProblemError: otherwise, naming ``what``, its class and those allowed.
+    """
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(k.__name__ for k in kinds)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 class Functions:
     """Everything a problem says, as Functions of (x, u, t, p) or, at the ends, of (x, t, p).
 
+    They take symbols as well as numbers, to build from; see ``Buffered`` for a loop of numbers.
+
     Attributes:
         rate: f (nx,).
         running_cost: L.

@@ -48,7 +48,12 @@ class Hamiltonian:
 
 @once_per_problem
 def hamiltonian(ocp: "OCP") -> Hamiltonian:
-    """Derive the Hamiltonian of a problem; in discrete time f is the next state."""
+    r"""Derive :math:`H = L + \lambda' f` and its derivatives, once for each problem.
+
+    Args:
+        ocp: the problem, parameters included; in discrete time f is the next state, and L the
+            cost of a step.
+    """
     m = ocp.model
     costate = ca.SX.sym("costate", m.nx)
     value = ocp.running_cost + ca.dot(costate, m.f)

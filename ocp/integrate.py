@@ -18,10 +18,20 @@ Rate = Callable[[ca.SX, ca.SX | float], ca.SX]
 
 @dataclass(frozen=True)
 class Integrator(ABC):
-    """An explicit one-step method, applied ``steps`` times per interval.
+    r"""An explicit one-step method, applied ``steps`` times per interval.
+
+    .. math:: k_i = g(z + a_i h\, k_{i-1}, \; s + a_i h), \qquad z(s + h) = z + h \sum_i b_i k_i
+
+    for dz/ds = g(z, s): each slope needs only the one before it.
 
     Args:
         steps: equal substeps in each interval.
+
+    Attributes:
+        order: p of the error O(h^p) over a horizon.
+
+    Raises:
+        ProblemError: if ``steps`` is not a whole number of at least 1.
     """
 
     steps: int = 1
@@ -32,7 +42,7 @@ class Integrator(ABC):
         whole(self.steps, "an integrator's number of steps")
 
     def __call__(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
-        """Return z(s + h) for dz/ds = rate(z, s)."""
+        """Return z(s + h) for dz/ds = rate(z, s), an expression of the shape of z."""
         substep = h / self.steps
         for i in range(self.steps):
             z = self.substep(rate, z, s + i * substep, substep)
@@ -41,7 +51,7 @@ class Integrator(ABC):
     @property
     @abstractmethod
     def slopes(self) -> tuple[tuple[float, float], ...]:
-        """Reach and weight of every slope: k_i is taken at z + reach h k_{i-1}, s + reach h."""
+        """Reach a_i and weight b_i of every slope."""
 
     def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
         """Return z + h (sum of weight times slope) after one substep."""
@@ -54,7 +64,11 @@ class Integrator(ABC):
 
 @dataclass(frozen=True)
 class Euler(Integrator):
-    """Explicit Euler, order 1: what the thesis' simulations use."""
+    """Explicit Euler, z + h g(z, s), order 1: what the thesis' simulations use.
+
+    Args:
+        steps: equal substeps in each interval.
+    """
 
     order: ClassVar[int] = 1
 
@@ -66,7 +80,11 @@ class Euler(Integrator):
 
 @dataclass(frozen=True)
 class Midpoint(Integrator):
-    """Explicit midpoint rule, order 2."""
+    """Explicit midpoint rule, z + h g(z + h k_1/2, s + h/2), order 2.
+
+    Args:
+        steps: equal substeps in each interval.
+    """
 
     order: ClassVar[int] = 2
 
@@ -78,7 +96,11 @@ class Midpoint(Integrator):
 
 @dataclass(frozen=True)
 class RK4(Integrator):
-    """The classical Runge-Kutta method, order 4."""
+    """The classical Runge-Kutta method, z + h (k_1 + 2 k_2 + 2 k_3 + k_4)/6, order 4.
+
+    Args:
+        steps: equal substeps in each interval.
+    """
 
     order: ClassVar[int] = 4
 
@@ -149,5 +171,11 @@ def _control(s: dict[str, ca.SX], fraction: ca.SX | float) -> ca.SX:
 
 
 def interpolate(left: ca.SX, right: ca.SX, s: ca.SX | float) -> ca.SX:
-    """Return the linear interpolation; free of rounding where both ends are equal."""
+    """Return left + s (right - left), which is free of rounding where both ends are equal.
+
+    Args:
+        left: value at s = 0 (n,).
+        right: value at s = 1 (n,).
+        s: fraction of the way, 0 to 1.
+    """
     return left + s * (right - left)

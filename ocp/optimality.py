@@ -54,7 +54,10 @@ class Optimality:
 
 @once_per_problem
 def derive(ocp: "OCP") -> Optimality:
-    """Derive the minimum principle of a continuous-time problem.
+    """Derive the minimum principle of a continuous-time problem, see ``Optimality``.
+
+    Args:
+        ocp: the problem; path constraints and state bounds play no part.
 
     Raises:
         UnsupportedProblem: for a discrete-time model, a Hamiltonian that is linear in a

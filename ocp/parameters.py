@@ -118,7 +118,12 @@ class Signal:
 
 @dataclass(frozen=True)
 class ParameterValues:
-    """The numbers of one run, ready to be sampled on any grid."""
+    """The numbers of one run, ready to be sampled on any grid.
+
+    Attributes:
+        entries: the parameters and signals of the problem, in its order; n_p components in all.
+        values: their numbers, (size,) for a parameter, (samples, size) for a signal.
+    """
 
     entries: tuple[Parameter | Signal, ...]
     values: tuple[np.ndarray, ...]

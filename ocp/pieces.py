@@ -55,9 +55,16 @@ class Pieces:
 
 
 def bernstein(coefficients: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return polynomials (P, m, n) at s (P,) -> (P, n), by de Casteljau's convex combinations.
+    r"""Return the values of polynomials, (P, n).
 
-    A polynomial with equal coefficients is met without rounding.
+    .. math:: \sum_{i=0}^{m-1} \binom{m-1}{i} s^i (1 - s)^{m-1-i} \, c_i
+
+    By de Casteljau's convex combinations: a polynomial with equal coefficients is met without
+    rounding.
+
+    Args:
+        coefficients: c of each polynomial, (P, m, n).
+        s: where each is evaluated, 0 to 1, (P,).
     """
     rows, share = coefficients, np.asarray(s)[:, None, None]
     while rows.shape[1] > 1:
@@ -66,7 +73,16 @@ def bernstein(coefficients: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def elevated(coefficients: np.ndarray, count: int) -> np.ndarray:
-    """Return the same polynomial (m, n) with ``count`` coefficients, at least m."""
+    r"""Return the same polynomial with more Bernstein coefficients.
+
+    .. math:: c^+_i = \tfrac{i}{m} c_{i-1} + (1 - \tfrac{i}{m}) c_i, \quad i = 0 \dots m
+
+    raises the degree m - 1 by one, again and again.
+
+    Args:
+        coefficients: (m, n).
+        count: coefficients of the result, (count, n); at least m.
+    """
     rows = coefficients
     while len(rows) < count:
         share = (np.arange(1, len(rows)) / len(rows))[:, None]

@@ -73,7 +73,20 @@ class Solver(ABC):
 
 
 def solve(ocp: OCP, solver: Solver, *, guess: Start | None = None) -> Solution:
-    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed."""
+    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
+
+    Args:
+        ocp: the problem.
+        solver: the method with its options.
+        guess: where to start; without one the problem's own guess, else the method's default.
+
+    Returns:
+        the solution, whatever its status; ``or_raise()`` insists on success.
+
+    Raises:
+        UnsupportedProblem: where the method cannot treat the problem, naming the term.
+        ProblemError: for a guess of the wrong shape.
+    """
     start = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - start

@@ -2,33 +2,16 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 
 from ocp.compile import compiled
-from ocp.constraint import Constraint
 from ocp.data import Data
 from ocp.functions import stacked
 from ocp.integrate import Integrator, Stage
 from ocp.problem import OCP
-
-
-@dataclass(frozen=True)
-class Row:
-    """What one row of the constraints says, for messages and bounds."""
-
-    name: str
-    place: Literal["dynamics", "time", "path", "initial", "terminal"]
-    node: int
-    lower: float
-    upper: float
-
-    @property
-    def is_equation(self) -> bool:
-        """Whether the row is an equation."""
-        return self.lower == self.upper
+from ocp.rows import Row, most_violated, rows_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +147,7 @@ class Transcription:
         ocp = self.ocp
         gap = [Row(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0) for name in ocp.model.x_names]
         gap += [Row("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = _rows(ocp.at("path"), "path")
+        path = rows_of(ocp.at("path"), "path")
         on_control = self._depends_on_control
         rows: list[Row] = []
         for k in range(self.n):
@@ -174,9 +157,11 @@ class Transcription:
                 free = {"lower": -np.inf, "upper": np.inf} if decided and not depends else {}
                 rows.append(replace(row, node=k, **free))
             if k == 0:
-                rows += _rows(ocp.at("initial"), "initial")
+                rows += rows_of(ocp.at("initial"), "initial")
         last = [row for row, depends in zip(path, on_control, strict=True) if not depends]
-        rows += [replace(row, node=self.n) for row in last + _rows(ocp.at("terminal"), "terminal")]
+        rows += [
+            replace(row, node=self.n) for row in last + rows_of(ocp.at("terminal"), "terminal")
+        ]
         return tuple(rows)
 
     def bounds(self, data: Data) -> dict[str, np.ndarray]:
@@ -205,17 +190,13 @@ class Transcription:
         self, w: np.ndarray, g: np.ndarray, bounds: dict[str, np.ndarray]
     ) -> tuple[float, Row | None]:
         """Return the largest violation of any constraint or state bound, and which it is."""
-        in_g = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
-        in_w = np.maximum(bounds["lbx"] - w, w - bounds["ubx"])
-        if max(in_g.max(initial=0.0), in_w.max(initial=0.0)) <= 0.0:
-            return 0.0, None
-        if in_g.max(initial=0.0) >= in_w.max():
-            return float(in_g.max()), self.rows[int(in_g.argmax())]
-        i, size = int(in_w.argmax()), self.nz + self.ocp.model.nu
+        return most_violated(w, g, bounds, self.rows, self._bound)
+
+    def _bound(self, i: int) -> Row:
+        """Return what the bound of an unknown says."""
+        node, entry = divmod(i, self.nz + self.ocp.model.nu)
         names = [*self.ocp.model.x_names, *["final time"] * int(self.ocp.has_free_time)]
-        names += self.ocp.model.u_names
-        bound = Row(f"bound of {names[i % size]}", "path", i // size, 0.0, 0.0)
-        return float(in_w.max()), bound
+        return Row(f"bound of {(*names, *self.ocp.model.u_names)[entry]}", "path", node, 0.0, 0.0)
 
     # -- costates -----------------------------------------------------------------------
 
@@ -253,14 +234,3 @@ class Transcription:
         rows = [path[i] for i, depends in enumerate(self._depends_on_control) if not depends]
         last = ca.vertcat(ca.SX(0, 1), *rows, stacked(self.ocp.at("terminal")))
         return ca.Function("last", [m.x, m.t, self.ocp.p], [last])
-
-
-def _rows(
-    constraints: tuple[Constraint, ...], place: Literal["path", "initial", "terminal"]
-) -> list[Row]:
-    """Rows of constraints at node 0."""
-    return [
-        Row(c.name, place, 0, float(low), float(high))
-        for c in constraints
-        for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
-    ]

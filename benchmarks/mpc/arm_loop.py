@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cache, partial
 
 import casadi as ca
-import numpy as np
 
 from benchmarks.methods.tuned_kinematics import instantaneous, tuned_kinematics
 from models import ArmScenario, DistanceCost, Path, redundancy_ocp
@@ -128,10 +127,3 @@ def loop(scenario: ArmScenario, kind: str, horizon: float) -> Rollout:
     if kind != INSTANTANEOUS:
         return run(controller(kind, problem(scenario, horizon)), duration=duration)
     return run(law(scenario, tuned(scenario)), duration=duration)
-
-
-def cost_until(rollout: Rollout, end: float) -> float:
-    """Return the cost of the first part of a loop [s]; inf where it ended before."""
-    whole = len(rollout.costs) == len(rollout.t) - 1 and rollout.t[-1] >= end - _ROUNDING
-    first = rollout.t[1:] <= end + _ROUNDING
-    return float(np.sum(rollout.costs[first])) if whole else np.inf

@@ -4,23 +4,8 @@ import casadi as ca
 
 from models._numbers import at_least
 from models.textbook.ends import ends_at
+from models.textbook.mass import mass
 from ocp import OCP, Box, FreeTime, Model, ProblemError
-
-
-def _model(dt: float | None = None) -> Model:
-    """Position [m] and velocity [m/s], driven by an acceleration [m/s^2]."""
-    x, v, u = ca.SX.sym("position"), ca.SX.sym("velocity"), ca.SX.sym("acceleration")
-    rate = ca.vertcat(v, u)
-    after = ca.vertcat(x + (dt or 0.0) * v + (dt or 0.0) ** 2 / 2 * u, v + (dt or 0.0) * u)
-    return Model(
-        name="double integrator",
-        x=ca.vertcat(x, v),
-        u=u,
-        f=rate if dt is None else after,
-        dt=dt,
-        x_units=("m", "m/s"),
-        u_units=("m/s^2",),
-    )
 
 
 def double_integrator_energy() -> OCP:
@@ -33,7 +18,7 @@ def double_integrator_energy() -> OCP:
     Optimum: u* = 6 - 12 t, cost exactly 6. H_u = 0 makes u = -λ_2 linear in time, the ends
     fix its two constants; costates (-12, 12 t - 6).
     """
-    model = _model()
+    model = mass()
     return OCP(
         name="double integrator, energy",
         model=model,
@@ -55,7 +40,7 @@ def double_integrator_minimum_time() -> OCP:
     Optimum: u* = 1 for the first second and -1 for the second, T = 2 s exactly: with half
     of the way accelerated, T²/4 = 1.
     """
-    model = _model()
+    model = mass()
     return OCP(
         name="double integrator, minimum time",
         model=model,
@@ -79,7 +64,7 @@ def double_integrator_bounded_energy() -> OCP:
     time s = 1/2 - t left to the middle: the way is 2∫ s u ds over (0, 1/2) = 10 (1/8 - w²/6) = 1,
     so w² = 3/20; the cost is 25 (1/2 - 2w/3). Costates (-5/w, -5/(2w)).
     """
-    model = _model()
+    model = mass()
     return OCP(
         name="double integrator, bounded energy",
         model=model,
@@ -134,7 +119,7 @@ def double_integrator_distance() -> OCP:
     Optimum: -1/24 exactly, with u = (1 - t)/2: the push at t moves x(1) by 1 - t. Costates
     (-1/2, -(1 - t)/2).
     """
-    model = _model()
+    model = mass()
     return OCP(
         name="double integrator, distance",
         model=model,
@@ -166,7 +151,7 @@ def discrete_double_integrator(steps: int, dt: float) -> OCP:
     """
     if steps != int(steps) or steps < 1:
         raise ProblemError(f"discrete double integrator: steps = {steps!r}, it must be 1 or more")
-    model = _model(at_least(dt, 0.0, "discrete double integrator: dt", strictly=True))
+    model = mass(at_least(dt, 0.0, "discrete double integrator: dt", strictly=True))
     return OCP(
         name="discrete double integrator",
         model=model,

@@ -1,9 +1,8 @@
 """Fuller's problem: infinitely many switches in finite time."""
 
-import casadi as ca
-
 from models.textbook.ends import ends_at
-from ocp import OCP, Box, Model
+from models.textbook.mass import mass
+from ocp import OCP, Box
 
 
 def fuller() -> OCP:
@@ -20,21 +19,13 @@ def fuller() -> OCP:
     cost of an arc by q⁵: a geometric sum, and the origin is reached at t = 1 + abs(v_1)(1 + (1 +
     q)/(1 - q)) = 2.92 < 3.5, after which the mass rests.
     """
-    x, v, u = ca.SX.sym("position"), ca.SX.sym("velocity"), ca.SX.sym("acceleration")
-    state = ca.vertcat(x, v)
+    model = mass()
     return OCP(
         name="Fuller",
-        model=Model(
-            name="double integrator",
-            x=state,
-            u=u,
-            f=ca.vertcat(v, u),
-            x_units=("m", "m/s"),
-            u_units=("m/s^2",),
-        ),
+        model=model,
         x0=[0.0, 1.0],
         horizon=3.5,
-        running_cost=x**2,
+        running_cost=model.x[0] ** 2,
         control_bounds=Box(-1.0, 1.0),
-        constraints=ends_at(state, 0.0),
+        constraints=ends_at(model.x, 0.0),
     )

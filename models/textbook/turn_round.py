@@ -1,31 +1,23 @@
 """Turning round before a wall: a state constraint of second order, in closed form."""
 
-import casadi as ca
 import numpy as np
 
 from models.textbook.ends import ends_at
-from ocp import OCP, Box, Model
+from models.textbook.mass import mass
+from ocp import OCP, Box
 
 
 def _turn_round(name: str, wall: float, weight: float, pushes: Box, behind: float) -> OCP:
-    x, v, u = ca.SX.sym("position"), ca.SX.sym("velocity"), ca.SX.sym("acceleration")
-    state = ca.vertcat(x, v)
+    model = mass()
     return OCP(
         name=name,
-        model=Model(
-            name="double integrator",
-            x=state,
-            u=u,
-            f=ca.vertcat(v, u),
-            x_units=("m", "m/s"),
-            u_units=("m/s^2",),
-        ),
+        model=model,
         x0=[0.0, 1.0],
         horizon=1.0,
-        running_cost=weight * u**2,
+        running_cost=weight * model.u**2,
         control_bounds=pushes,
         state_bounds=Box([behind, -np.inf], [wall, np.inf]),
-        constraints=ends_at(state, [0.0, -1.0]),
+        constraints=ends_at(model.x, [0.0, -1.0]),
     )
 
 

@@ -48,17 +48,6 @@ def with_input_rate(
     def moved(expression: ca.SX | float) -> ca.SX:
         return ca.substitute(ca.SX(expression), m.u, now)
 
-    units = m.u_units or ("",) * m.nu
-    model = Model(
-        name=f"{m.name} with input rate",
-        x=ca.vertcat(m.x, before),
-        u=change,
-        f=ca.vertcat(moved(m.f), now),
-        t=m.t,
-        dt=m.dt,
-        x_units=(*m.x_units, *units) if m.x_units else (),
-        u_units=m.u_units,
-    )
     constraints = [replace(c, expression=moved(c.expression)) for c in ocp.constraints]
     if ocp.control_bounds.is_active:
         box = ocp.control_bounds
@@ -68,11 +57,27 @@ def with_input_rate(
     return replace(
         ocp,
         name=f"{ocp.name}, with input rate",
-        model=model,
+        model=_model(m, before, change),
         x0=np.append(np.asarray(ocp.x0), numbers(previous, m.nu, f"{ocp.name}: previous")),
         running_cost=moved(ocp.running_cost) + ca.dot(ca.DM(weights), change**2),
         control_bounds=rate,
         state_bounds=Box(np.append(state.lower, -free), np.append(state.upper, free)),
         constraints=tuple(constraints),
         guess=None,
+    )
+
+
+def _model(m: Model, before: ca.SX, change: ca.SX) -> Model:
+    """Return the model with the control before as a state, and its change as control."""
+    now = before + change
+    units = m.u_units or ("",) * m.nu
+    return Model(
+        name=f"{m.name} with input rate",
+        x=ca.vertcat(m.x, before),
+        u=change,
+        f=ca.vertcat(ca.substitute(m.f, m.u, now), now),
+        t=m.t,
+        dt=m.dt,
+        x_units=(*m.x_units, *units) if m.x_units else (),
+        u_units=m.u_units,
     )

@@ -73,6 +73,9 @@ def with_stationary_end(ocp: OCP) -> OCP:
     constraint is active after the horizon, a horizon of any length is then as good as an
     infinite one: the finite solution is the infinite one, cut [Mayne et al. 2000].
 
+    Args:
+        ocp: linear-quadratic in discrete time, n states; its own terminal cost is replaced.
+
     Raises:
         UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse.
     """

@@ -35,6 +35,9 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
 
     Source: thesis (2.1) to (2.3), (2.14), (2.82).
 
+    Args:
+        ocp: the problem; its constraints are read as well.
+
     Raises:
         UnsupportedProblem: naming the term that is not linear or quadratic, or the weight that
             is indefinite with its eigenvalue; for a continuous model, which ``discretise``

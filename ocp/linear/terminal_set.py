@@ -82,6 +82,9 @@ def with_terminal_set(ocp: OCP) -> OCP:
     With both, a receding horizon of any length stays feasible once it is, and is stable: the
     last plan, shifted and continued by u = -Kx, is a feasible one [Mayne et al. 2000].
 
+    Args:
+        ocp: linear-quadratic in discrete time, all matrices constant.
+
     Raises:
         UnsupportedProblem: what ``terminal_set`` and ``with_stationary_end`` refuse.
     """

@@ -81,6 +81,9 @@ def costates_along(solution: Solution) -> Solution:
     Any trajectory can so start an indirect method (also one of a method that knows no
     costates). Where the problem has terminal equations the final costate is the gradient of
     the terminal cost plus the part of the given costate that is normal to them.
+
+    Args:
+        solution: of any method; returned as it is where its controls make the state blow up.
     """
     truth = follow(solution)
     if not truth.is_finite:

@@ -1,15 +1,13 @@
 """A problem on collocation points as a nonlinear program."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 from scipy.linalg import block_diag
 
-from ocp import OCP, Constraint, Data, Row
+from ocp import OCP, Data, Row, most_violated, rows_of
 from solvers.collocation.mesh import Grid
 
 
@@ -159,7 +157,7 @@ class Collocated:
         ocp, grid, last = self.ocp, self.grid, len(self.grid.nodes) - 1
         gap = [Row(f"dynamics of {name}", "dynamics", 0, 0.0, 0.0) for name in ocp.model.x_names]
         time = [Row("final time", "time", 0, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = _rows(ocp.at("path"), "path")
+        path = rows_of(ocp.at("path"), "path")
         on_control = ocp.functions.path_on_control
         alone = [row for row, depends in zip(path, on_control, strict=True) if not depends]
         blocks = (
@@ -167,9 +165,9 @@ class Collocated:
             (gap, grid.edge_nodes[1:]),
             (time, grid.edge_nodes[1:]),
             (path, grid.point_nodes),
-            (_rows(ocp.at("initial"), "initial"), [0]),
+            (rows_of(ocp.at("initial"), "initial"), [0]),
             (alone if ocp.has_free_start else [], [0]),
-            (_rows(ocp.at("terminal"), "terminal"), [last]),
+            (rows_of(ocp.at("terminal"), "terminal"), [last]),
         )
         return tuple(
             replace(row, node=int(node))
@@ -210,14 +208,7 @@ class Collocated:
         self, w: np.ndarray, g: np.ndarray, bounds: dict[str, np.ndarray]
     ) -> tuple[float, Row | None]:
         """Return the largest violation of any constraint or bound, and which it is."""
-        in_g = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
-        in_w = np.maximum(bounds["lbx"] - w, w - bounds["ubx"])
-        if max(in_g.max(initial=0.0), in_w.max(initial=0.0)) <= 0.0:
-            return 0.0, None
-        if in_g.max(initial=0.0) >= in_w.max():
-            return float(in_g.max()), self.rows[int(in_g.argmax())]
-        i = int(in_w.argmax())
-        return float(in_w[i]), self._bound(i)
+        return most_violated(w, g, bounds, self.rows, self._bound)
 
     def _bound(self, i: int) -> Row:
         """Return what the bound of an unknown says."""
@@ -232,14 +223,3 @@ class Collocated:
         ]
         name, node = labels[i]
         return Row(f"bound of {name}", "path", node, 0.0, 0.0)
-
-
-def _rows(
-    constraints: Iterable[Constraint], place: Literal["path", "initial", "terminal"]
-) -> list[Row]:
-    """Rows of constraints at node 0."""
-    return [
-        Row(c.name, place, 0, float(low), float(high))
-        for c in constraints
-        for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
-    ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ocp import (
     OCP,
+    Evaluation,
     ProblemError,
     Solution,
     Solver,
@@ -58,12 +59,9 @@ def raise_until_clear(
     """
     instance(solver, Solver, "raise until clear: solver")
     whole(most, "raise until clear: most")
-    known = {entry.name: entry for entry in soft.parameters}
-    if parameter not in known:
-        raise ProblemError(f"{soft.name} has no parameter '{parameter}'")
+    price = _first_price(soft, parameter)
     if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
         raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
-    price = np.asarray(known[parameter].value, dtype=float)
     if not (tolerance > 0.0 and (price > 0.0).all()):
         raise ProblemError(
             f"raise until clear: tolerance = {tolerance} and '{parameter}' = {price} must be "
@@ -71,26 +69,37 @@ def raise_until_clear(
         )
     program = solver.build(soft)
     runs: list[Solution] = []
-    violations: list[float] = []
-    worst = ""
+    verdicts: list[Evaluation] = []
     while len(runs) < most:
         run = program.run(parameters={parameter: price}, guess=guess)
-        verdict = evaluate(run.with_(problem=hard, parameters={}, control_kind=_kind(run)))
-        runs, violations = [*runs, run], [*violations, verdict.violation]
-        worst = verdict.worst
-        if not run.status.is_success or verdict.violation <= tolerance:
+        runs.append(run)
+        verdicts.append(evaluate(run.with_(problem=hard, parameters={}, control_kind=_kind(run))))
+        if not run.status.is_success or verdicts[-1].violation <= tolerance:
             break
         price = factor * price
-    last, status, message = runs[-1], runs[-1].status, runs[-1].message
-    if status.is_success and violations[-1] > tolerance:
+    return _summed(runs, verdicts, tolerance)
+
+
+def _first_price(soft: OCP, parameter: str) -> np.ndarray:
+    known = {entry.name: entry for entry in soft.parameters}
+    if parameter not in known:
+        raise ProblemError(f"{soft.name} has no parameter '{parameter}'")
+    return np.asarray(known[parameter].value, dtype=float)
+
+
+def _summed(runs: list[Solution], verdicts: list[Evaluation], tolerance: float) -> Solution:
+    """Return the last run with the work of all; not clear at the last price is infeasible."""
+    last, verdict = runs[-1], verdicts[-1]
+    status, message = last.status, last.message
+    if status.is_success and verdict.violation > tolerance:
         status = Status.INFEASIBLE
-        message = f"{worst} is violated by {violations[-1]:.3g} at any price"
+        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at any price"
     return last.with_(
         status=status,
         message=message,
         iterations=sum(run.iterations for run in runs),
         work=sum((run.work for run in runs), Work()),
-        history={**last.history, "violation": np.array(violations)},
+        history={**last.history, "violation": np.array([v.violation for v in verdicts])},
         solve_time=sum(run.solve_time for run in runs),
     )
 

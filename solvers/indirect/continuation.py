@@ -1,11 +1,15 @@
 """Where Newton fails from a guess: an easier problem first, moved to the wanted one."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, Data, ParameterValues, ProblemError, UnsupportedProblem
+from solvers.indirect.newton import NewtonResult
+
+_SMALLEST_ADVANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -72,3 +76,36 @@ class ParameterContinuation:
         easy = np.broadcast_to(np.asarray(self.easy, dtype=float), wanted[self.name].shape)
         moved = {**wanted, self.name: easy + share * (wanted[self.name] - easy)}
         return replace(data, values=ParameterValues.of(data.values.entries, moved)), 1.0
+
+
+def advanced(
+    continuation: HorizonContinuation | ParameterContinuation,
+    data: Data,
+    v: np.ndarray,
+    newton: Callable[[Data, float, np.ndarray], NewtonResult],
+) -> Iterator[NewtonResult]:
+    """Go from the easy problem to the wanted one; yield every attempt, the wanted one last.
+
+    Steps that succeed are doubled, those that fail quartered (halved until the easiest problem
+    is solved); it gives up where they become too small.
+
+    Args:
+        continuation: what makes the problem easier.
+        data: of the wanted problem.
+        v: unknowns to begin with.
+        newton: solves for data, a share of the horizon and first unknowns.
+    """
+    share = continuation.first
+    reached, advance = 0.0, continuation.first or 0.5
+    while True:
+        result = newton(*continuation.applied(data, share), v)
+        yield result
+        if result.converged and share >= 1.0:
+            return
+        if result.converged:
+            v, reached, advance = result.x, share, 2.0 * advance
+        else:
+            advance /= 4.0 if reached else 2.0
+            if advance < _SMALLEST_ADVANCE:
+                return
+        share = min(1.0, reached + advance)

@@ -20,11 +20,11 @@ from ocp import (
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot
 from solvers.indirect.crossings import Condition, Crossings, is_transversal, meets_start
-from solvers.indirect.extremal import Schedule
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.manifold import Kept, Manifold, redundant_by_one
 from solvers.indirect.reverse import Reverse
 from solvers.indirect.scan import Scan, Scanner
+from solvers.indirect.segments import Schedule
 from solvers.indirect.self_motion import seeds_around, self_motions
 
 # Of the scan: enough to find a root that Newton, with its own steps, then makes exact.
@@ -126,6 +126,11 @@ def enumerate_extremals(
     guesses = [_guess(reverse, schedule, start, row, data.x0) for row in ends]
     solver = solver or IndirectShooting(_SEGMENTS, _FINE_STEPS, max_steps=_NEWTON_STEPS)
     found = list(_exact(solver.build(ocp), data, guesses))
+    return _enumeration(found, scans)
+
+
+def _enumeration(found: list[Solution], scans: tuple[Scan, ...]) -> Enumeration:
+    """Return the distinct extremals among those found, the cheapest first."""
     solutions = _distinct([solution for solution in found if solution.status.is_success])
     judged = np.array([evaluate(solution).cost for solution in solutions])
     order = np.argsort(judged, kind="stable")

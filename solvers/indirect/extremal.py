@@ -2,118 +2,13 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from ocp import (
-    OCP,
-    Buffered,
-    Data,
-    Integrator,
-    Optimality,
-    compiled,
-    derive,
-    interpolate,
-    symbol_kind,
-)
-
-
-@dataclass(frozen=True, eq=False)
-class Paths:
-    """The canonical flow integrated on every segment.
-
-    Attributes:
-        z: (x, costate) at every step, (S, M + 1, 2 nx).
-        costs: running cost of every step, (S * M,).
-    """
-
-    z: np.ndarray
-    costs: np.ndarray
-
-    @property
-    def ends(self) -> np.ndarray:
-        """Z at the end of each segment, (S, 2 nx)."""
-        return self.z[:, -1]
-
-    @property
-    def nodes(self) -> np.ndarray:
-        """Z at every step of the whole horizon, (S M + 1, 2 nx)."""
-        return np.vstack([self.z[:, :-1].reshape(-1, self.z.shape[2]), self.z[-1, -1]])
-
-
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """Where in time and parameters a run integrates: S * M steps.
-
-    Attributes:
-        t0: initial time [s].
-        duration: of the whole horizon [s], where it is not an unknown.
-        fractions: step boundaries as fractions of the horizon, (S M + 1,).
-        p_left: parameters at the start of each step, (S M, n_p).
-        p_right: parameters at the end of each step, (S M, n_p).
-        p_first: parameters at t0.
-        p_last: parameters at the final time.
-    """
-
-    t0: float
-    duration: float
-    fractions: np.ndarray
-    p_left: np.ndarray
-    p_right: np.ndarray
-    p_first: np.ndarray
-    p_last: np.ndarray
-
-    @classmethod
-    def of(cls, ocp: OCP, data: Data, steps: int, share: float = 1.0) -> "Schedule":
-        """Return the schedule of the first ``share`` of the horizon."""
-        fractions = np.linspace(0.0, 1.0, steps + 1)
-        left, right = data.values.on(share * fractions)
-        return cls(
-            t0=data.t0,
-            duration=share * ocp.duration,
-            fractions=fractions,
-            p_left=left,
-            p_right=right,
-            p_first=data.values.at(0.0)[0],
-            p_last=data.values.at(share)[0],
-        )
-
-    def reversed(self) -> "Schedule":
-        """Return the same schedule from the end to the start: its steps go back in time."""
-        return Schedule(
-            t0=self.t0 + self.duration,
-            duration=-self.duration,
-            fractions=1.0 - self.fractions[::-1],
-            p_left=self.p_right[::-1],
-            p_right=self.p_left[::-1],
-            p_first=self.p_last,
-            p_last=self.p_first,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """How the unknowns are stacked: z of each segment's start, then mu, nu and the duration."""
-
-    segments: int
-    nx: int
-    n_mu: int
-    n_nu: int
-    free_time: bool
-
-    def join(self, z: np.ndarray, mu: np.ndarray, nu: np.ndarray, duration: float) -> np.ndarray:
-        """Return the vector of unknowns."""
-        return np.concatenate([z.ravel(), mu, nu, [duration] if self.free_time else []])
-
-    def split(
-        self, v: np.ndarray, duration: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Return z (S, 2 nx), mu, nu and the duration, which is the given one where fixed."""
-        z, mu, nu, rest = np.split(
-            v, np.cumsum([2 * self.nx * self.segments, self.n_mu, self.n_nu])
-        )
-        return z.reshape(self.segments, -1), mu, nu, float(rest[0]) if self.free_time else duration
+from ocp import OCP, Buffered, Integrator, Optimality, compiled, derive
+from solvers.indirect.canonical import canonical_step, end_conditions, start_conditions
+from solvers.indirect.newton_system import assembled
+from solvers.indirect.segments import Paths, Schedule, Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +32,8 @@ class Extremals:
     steps: int
     roll: Buffered
     slopes: Buffered
-    ends: ca.Function
-    starts: ca.Function
+    ends: Buffered
+    starts: Buffered
 
     @classmethod
     def of(
@@ -146,16 +41,16 @@ class Extremals:
     ) -> "Extremals":
         """Do all symbolic work; ``fast``: with the steps as machine code."""
         optimality = derive(ocp)
-        starts, ends = _start_conditions(ocp, optimality), _end_conditions(ocp, optimality)
+        starts, ends = start_conditions(ocp, optimality), end_conditions(ocp, optimality)
         shape = Shape(
             segments, ocp.model.nx, starts.size1_in(1), ends.size1_in(1), ocp.has_free_time
         )
-        step, slope = _step(ocp, optimality, integrator)
+        step, slope = canonical_step(ocp, optimality, integrator)
         if fast:
             step, slope = compiled(step), compiled(slope)
         roll = Buffered(step.mapaccum(steps).map(segments))
         slopes = Buffered(slope.map(segments * steps))
-        return cls(ocp, optimality, shape, steps, roll, slopes, ends, starts)
+        return cls(ocp, optimality, shape, steps, roll, slopes, Buffered(ends), Buffered(starts))
 
     # -- the boundary value problem --------------------------------------------------------
 
@@ -167,7 +62,7 @@ class Extremals:
         paths = self.paths(z, schedule, duration)
         end = self.ends(paths.ends[-1], nu, schedule.t0 + duration, schedule.p_last)[0]
         parts = [self._start(z[0], mu, schedule, x0)[0], (paths.ends[:-1] - z[1:]).ravel(), end]
-        return np.concatenate([np.array(part, dtype=float).ravel() for part in parts]), paths
+        return np.concatenate([part.ravel() for part in parts]), paths
 
     def paths(self, z: np.ndarray, schedule: Schedule, duration: float) -> Paths:
         """Integrate every segment from its start."""
@@ -210,9 +105,7 @@ class Extremals:
         s, size = self.shape.segments, 2 * self.shape.nx
         in_z, in_time = slopes
         t = schedule.t0 + duration
-        _, end_z, end_nu, end_t = (
-            np.array(a) for a in self.ends(paths.ends[-1], nu, t, schedule.p_last)
-        )
+        _, end_z, end_nu, end_t = self.ends(paths.ends[-1], nu, t, schedule.p_last)
         start_z, start_mu = self._start(z[0], mu, schedule, x0)[1:]
         blocks: list[list] = [[None] * (s + 3) for _ in range(s + 1)]
         blocks[0][0], blocks[0][s] = start_z, start_mu
@@ -221,7 +114,7 @@ class Extremals:
             blocks[k + 1][s + 2] = in_time[k][:, None]
         blocks[s][s - 1], blocks[s][s + 1] = end_z @ in_z[-1], end_nu
         blocks[s][s + 2] = end_z @ in_time[-1][:, None] + end_t
-        return _assemble(blocks, keep_time=self.shape.free_time)
+        return assembled(blocks if self.shape.free_time else [row[:-1] for row in blocks])
 
     def trajectory(
         self, paths: Paths, schedule: Schedule, duration: float
@@ -253,75 +146,12 @@ class Extremals:
         self, z: np.ndarray, mu: np.ndarray, schedule: Schedule, x0: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.ocp.has_free_start:
-            answer = self.starts(z, mu, schedule.t0, schedule.p_first)
-            value, in_z, in_mu = (np.array(a) for a in answer)
+            value, in_z, in_mu = self.starts(z, mu, schedule.t0, schedule.p_first)
             return value.ravel(), in_z, in_mu
         nx = self.shape.nx
         return z[:nx] - x0, np.eye(nx, 2 * nx), np.empty((nx, 0))
 
 
-def _step(
-    ocp: OCP, optimality: Optimality, integrator: Integrator
-) -> tuple[ca.Function, ca.Function]:
-    nx, n_p = ocp.model.nx, ocp.p.numel()
-    kind = symbol_kind(optimality.flow)
-    z, duration, t0 = kind.sym("z", 2 * nx), kind.sym("T"), kind.sym("t0")
-    fraction, share = kind.sym("fraction"), kind.sym("share")
-    p0, p1 = kind.sym("p0", n_p), kind.sym("p1", n_p)
-
-    def rate(y, s):
-        t, p = t0 + duration * (fraction + s * share), interpolate(p0, p1, s)
-        u = optimality.control(y[:nx], y[nx : 2 * nx], t, p)
-        cost = ocp.functions.running_cost(y[:nx], u, t, p)
-        return duration * share * ca.vertcat(optimality.flow(y[: 2 * nx], t, p), cost)
-
-    end = integrator(rate, ca.vertcat(z, 0), 0.0, 1.0)
-    inputs = [z, duration, t0, fraction, share, p0, p1]
-    names = ["z", "T", "t0", "fraction", "share", "p0", "p1"]
-    derivatives = [ca.densify(ca.jacobian(end[: 2 * nx], v)) for v in (z, duration)]
-    if kind is ca.SX:  # flow and cost share most of what they compute: half of a step's time
-        end, derivatives = ca.cse([end])[0], ca.cse(derivatives)
-    step = ca.Function("step", inputs, [end[: 2 * nx], end[2 * nx]], names, ["z_next", "cost"])
-    return step, ca.Function("slope", inputs, derivatives, names, ["in_z", "in_T"])
-
-
-def _start_conditions(ocp: OCP, optimality: Optimality) -> ca.Function:
-    z = ca.SX.sym("z", 2 * ocp.model.nx)
-    mu, t, p = (ca.SX.sym(n, optimality.start.sparsity_in(n)) for n in ("mu", "t", "p"))
-    value = optimality.start(z[: ocp.model.nx], z[ocp.model.nx :], mu, t, p)
-    derivatives = [ca.densify(ca.jacobian(value, v)) for v in (z, mu)]
-    return ca.Function("starts", [z, mu, t, p], [value, *derivatives])
-
-
-def _end_conditions(ocp: OCP, optimality: Optimality) -> ca.Function:
-    kind = symbol_kind(optimality.end)
-    z = kind.sym("z", 2 * ocp.model.nx)
-    nu, t, p = (kind.sym(n, optimality.end.sparsity_in(n)) for n in ("nu", "t", "p"))
-    value = optimality.end(z[: ocp.model.nx], z[ocp.model.nx :], nu, t, p)
-    derivatives = [ca.densify(ca.jacobian(value, v)) for v in (z, nu, t)]
-    return ca.Function("ends", [z, nu, t, p], [value, *derivatives])
-
-
 def _blocks(horizontal: np.ndarray, size: int) -> np.ndarray:
     """Return CasADi's blocks side by side as (number, size, size)."""
     return horizontal.T.reshape(-1, size, size).transpose(0, 2, 1)
-
-
-def _assemble(blocks: list[list], *, keep_time: bool) -> sparse.csc_matrix:
-    """Stack the blocks, without columns that stand for no unknown."""
-    rows = [row if keep_time else row[:-1] for row in blocks]
-    used = [j for j in range(len(rows[0])) if any(r[j] is not None and r[j].shape[1] for r in rows)]
-    columns = dict(zip(used, np.cumsum([0, *(_width(rows, j) for j in used)]), strict=False))
-    entries, top = [], 0
-    for row in rows:
-        for j, left in columns.items():
-            if row[j] is not None:
-                i, k = np.nonzero(row[j])
-                entries.append((row[j][i, k], top + i, left + k))
-        top += next(len(block) for block in row if block is not None)
-    data, i, k = (np.concatenate(part) for part in zip(*entries, strict=True))
-    return sparse.csc_matrix((data, (i, k)), shape=(top, sum(_width(rows, j) for j in used)))
-
-
-def _width(rows: list[list], j: int) -> int:
-    return next(row[j].shape[1] for row in rows if row[j] is not None)

@@ -31,6 +31,11 @@ class NewtonResult:
     evaluations: int
     history: np.ndarray
 
+    @property
+    def in_words(self) -> str:
+        """How far it came, for a message."""
+        return f"residual {self.residual:.3g} after {self.steps} Newton steps"
+
 
 T = TypeVar("T")
 Residual = Callable[[np.ndarray], tuple[np.ndarray, T]]

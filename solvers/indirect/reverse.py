@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Integrator
-from solvers.indirect.extremal import Extremals, Paths, Schedule
+from solvers.indirect.extremal import Extremals
+from solvers.indirect.segments import Paths, Schedule
 from solvers.tabular.columns import Columns
 
 

@@ -27,10 +27,10 @@ from ocp import (
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot, transversality
 from solvers.indirect.chart import Chart
-from solvers.indirect.extremal import Paths, Schedule
 from solvers.indirect.manifold import Kept, Manifold, out_of_reach
 from solvers.indirect.newton import NewtonResult, Solve, newton
 from solvers.indirect.reverse import Reverse
+from solvers.indirect.segments import Paths, Schedule
 
 # A start further than this from where it has to be is another one; a nearer one is inaccurate.
 _ELSEWHERE, _INACCURATE = 1e-3, 1e-6
@@ -252,10 +252,9 @@ class _Task:
         )
 
     def _verdict(self, last: NewtonResult, x: np.ndarray) -> tuple[Status, str]:
-        message = f"residual {last.residual:.3g} after {last.steps} Newton steps"
         if not last.converged:
             limit = last.steps >= self.program.solver.max_steps
-            return (Status.ITERATION_LIMIT if limit else Status.NO_PROGRESS), message
+            return (Status.ITERATION_LIMIT if limit else Status.NO_PROGRESS), last.in_words
         away = float(np.abs(self.start.linearised(x[None, :])[0]).max())
         if self.program.solver.boundary == 4:
             away = float(np.abs(x - self.data.x0).max())

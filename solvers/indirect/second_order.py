@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.indirect.extremal import Extremals, Paths, Schedule
+from solvers.indirect.extremal import Extremals
+from solvers.indirect.segments import Paths, Schedule
 
 # Columns of the Lagrangian plane this close to dependent count as a conjugate point.
 _SINGULAR = 1e-9
@@ -114,9 +115,7 @@ def _final_plane(
 ) -> np.ndarray:
     """All (dx, dcostate) that meet the linearised end conditions for some multipliers."""
     t = schedule.t0 + schedule.duration
-    _, in_z, in_nu, _ = (
-        np.array(a) for a in extremals.ends(paths.ends[-1], nu, t, schedule.p_last)
-    )
+    _, in_z, in_nu, _ = extremals.ends(paths.ends[-1], nu, t, schedule.p_last)
     conditions = np.hstack([in_z, in_nu])
     _, _, rows = np.linalg.svd(conditions)
     return _orthonormal(rows[len(conditions) :, : in_z.shape[1]].T)
@@ -133,7 +132,7 @@ def _tangent_curvature(
     """The cost-to-go must curve upwards along the start manifold."""
     nx, m = extremals.shape.nx, extremals.shape.n_mu
     riccati = plane[nx:] @ np.linalg.inv(plane[:nx])
-    _, in_z, _ = (np.array(a) for a in extremals.starts(z0, mu, schedule.t0, schedule.p_first))
+    _, in_z, _ = extremals.starts(z0, mu, schedule.t0, schedule.p_first)
     normals, bending = in_z[:m, :nx], in_z[m:, :nx]
     tangent = np.linalg.svd(normals)[2][m:].T
     hessian = tangent.T @ (riccati + bending) @ tangent

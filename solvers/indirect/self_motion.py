@@ -82,7 +82,13 @@ def self_motions(
 
 
 def seeds_around(manifold: Manifold, x: np.ndarray, count: int = SEEDS) -> np.ndarray:
-    """Return a configuration and random ones (count, nx): angles all round, others about it."""
+    """Return a configuration and random ones, angles all round, other states about it.
+
+    Args:
+        manifold: which says what is an angle.
+        x: the configuration (nx,), the first row of the answer.
+        count: rows of the answer (count, nx); always the same for the same x.
+    """
     rng, finite = np.random.default_rng(0), np.isfinite(manifold.periods.of_states)
     width = np.where(finite, np.where(finite, manifold.periods.of_states, 0.0) / 2.0, 1.0 + abs(x))
     return np.vstack([x, x + rng.uniform(-1.0, 1.0, (count - 1, len(x))) * width])

@@ -47,6 +47,12 @@ def moving(f, *, x0: float, **changes) -> OCP:
     return OCP(**(given | terms))
 
 
+def mass() -> Model:
+    """Position and velocity, driven by an acceleration."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    return Model(name="double integrator", x=x, u=u, f=ca.vertcat(x[1], u))
+
+
 def ends(value: float, name: str = "end"):
     """Terminal constraint x = value, for ``point`` and ``moving``."""
     return lambda x, u: (Constraint(name, x, value, value, at="terminal"),)
@@ -89,14 +95,14 @@ def timed_transfer(**changes) -> OCP:
     1 - 18/T^4 = 0 follows T = 18^(1/4), and then T + 6/T^3 = T (1 + 6/T^4) = 4 T / 3. The same
     from H = 0 at t = 0, where v = 0: 1 + u^2/2 - u^2 = 0, u(0) = sqrt 2 = 6/T^2.
     """
-    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = mass()
     given: dict[str, Any] = {
         "name": "timed transfer",
-        "model": Model(name="double integrator", x=x, u=u, f=ca.vertcat(x[1], u)),
+        "model": model,
         "x0": [0.0, 0.0],
         "horizon": FreeTime(guess=1.5, lower=0.1, upper=10.0),
-        "running_cost": 1.0 + u**2 / 2,
-        "constraints": (Constraint("end", x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
+        "running_cost": 1.0 + model.u**2 / 2,
+        "constraints": (Constraint("end", model.x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
     }
     return OCP(**(given | changes))
 
@@ -112,16 +118,16 @@ def saturated_transfer(limit: float = 4.5) -> tuple[OCP, float]:
     and tau = 1/2 - t the way is 2 int_0^(1/2) tau u = 2m (w^2/3 + (1/4 - w^2)/2)
     = m/4 - m w^2/3 = 1, so w^2 = 3 (1/4 - 1/m), and the cost is m^2 (w/3 + 1/2 - w).
     """
-    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = mass()
     width = np.sqrt(3.0 * (0.25 - 1.0 / limit))
     ocp = OCP(
         name="saturated transfer",
-        model=Model(name="double integrator", x=x, u=u, f=ca.vertcat(x[1], u)),
+        model=model,
         x0=[0.0, 0.0],
         horizon=1.0,
-        running_cost=u**2 / 2,
+        running_cost=model.u**2 / 2,
         control_bounds=Box(-limit, limit),
-        constraints=(Constraint("end", x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
+        constraints=(Constraint("end", model.x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
     )
     return ocp, limit**2 * (0.5 - 2.0 * width / 3.0)
 

@@ -20,6 +20,7 @@ from ocp import (
 )
 from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 from tests.mpc.problems import cart
+from tests.solvers.problems import mass
 
 # Iterations stop at their own tolerance; between two runs only rounding differs.
 SAME = 1e-9
@@ -40,15 +41,15 @@ def swing() -> OCP:
 
 def quickest() -> OCP:
     """Bring a cart to rest, with a free final time that the stages depend on."""
-    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = mass()
     return OCP(
         name="quickest",
-        model=Model(name="cart", x=x, u=u, f=ca.vertcat(x[1], u)),
+        model=model,
         x0=[1.0, 0.0],
         horizon=FreeTime(guess=2.0, lower=0.5, upper=5.0),
-        running_cost=1.0 + u**2,
+        running_cost=1.0 + model.u**2,
         control_bounds=Box(-5.0, 5.0),
-        constraints=(Constraint("rest", x, 0.0, 0.0, at="terminal"),),
+        constraints=(Constraint("rest", model.x, 0.0, 0.0, at="terminal"),),
     )
 
 

@@ -6,7 +6,8 @@ import pytest
 from benchmarks.cases import arm_scenario
 from models import van_der_pol
 from ocp import OCP, RK4, Data
-from solvers.indirect.extremal import Extremals, Schedule
+from solvers.indirect.extremal import Extremals
+from solvers.indirect.segments import Schedule
 from tests.ocp.differences import jacobian
 from tests.solvers.problems import (
     circle_start,

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,7 +15,7 @@ from ocp import (
     Box,
     Constraint,
     Guess,
-    Model,
+    ProblemError,
     Solution,
     Solver,
     Status,
@@ -32,7 +33,7 @@ from solvers import (
     Schuetz,
     StagewiseNewton,
 )
-from tests.solvers.problems import changed, ends, moving, point
+from tests.solvers.problems import changed, ends, mass, moving, point, tracker
 
 SHOOTING = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
 DIRECT = (*SHOOTING, Collocation(10, 3), Collocation(10, 3, points="gauss"))
@@ -68,18 +69,40 @@ def stands_behind_nothing(solution: Solution) -> None:
         assert np.isfinite(array).all()
 
 
+# -- bad data -------------------------------------------------------------------------
+
+BAD_DATA: tuple[dict[str, Any], ...] = (
+    {"x0": [1.0, 2.0, 3.0]},
+    {"x0": [np.nan, 0.0]},
+    {"t0": np.inf},
+    {"parameters": {"weight": 1.0}},
+    {"parameters": {"gain": np.nan}},
+    # An indirect method reads the states of a guess, descent its controls, a direct method both.
+    {"guess": Guess(x=[1.0, 2.0, 3.0], u=[1.0, 2.0])},
+    {"guess": Guess(x=[np.nan, 0.0], u=[np.nan])},
+)
+
+
+@every
+def test_bad_data_are_refused(solver: Solver) -> None:
+    program = solver.build(tracker())
+    for data in BAD_DATA:
+        with pytest.raises(ProblemError):
+            program.run(**data)
+
+
 # -- infeasible -----------------------------------------------------------------------
 
 
 def braked() -> OCP:
     """3 m/s towards a wall 1 m away, with brakes of 1 m/s^2: it takes 4.5 m to stop."""
-    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = mass()
     return OCP(
         name="braked",
-        model=Model(name="cart", x=x, u=u, f=ca.vertcat(x[1], u)),
+        model=model,
         x0=[0.0, 3.0],
         horizon=1.0,
-        running_cost=u**2,
+        running_cost=model.u**2,
         control_bounds=Box(-1.0, 1.0),
         state_bounds=Box([-np.inf, -np.inf], [1.0, np.inf]),
     )
@@ -230,9 +253,10 @@ def test_iteration_limit_of_shooting() -> None:
         {"running_cost": lambda x, u: -(u**2)},
         {"running_cost": lambda x, u: u**2 - 10 * x**2},
         {"running_cost": lambda x, u: x},
+        {"running_cost": lambda x, u: u},
         {"terminal_cost": lambda x, u: -3 * x**2},
     ],
-    ids=["-u^2", "u^2 - 10 x^2", "x", "-3 x(1)^2"],
+    ids=["-u^2", "u^2 - 10 x^2", "x", "u", "-3 x(1)^2"],
 )
 def test_a_cost_without_lower_bound_is_no_success(terms: dict, solver: Solver) -> None:
     """The conjugate point of u^2 - 10 x^2 lies in the horizon; u = 0 is stationary in three."""

@@ -273,8 +273,6 @@ def test_continuation_in_a_free_horizon_is_refused() -> None:
             well()
         ),
         lambda: solve(van_der_pol(), IndirectShooting(), guess=Guess(costate=[1.0, 2.0, 3.0])),
-        lambda: IndirectShooting().build(van_der_pol()).run(x0=[1.0]),
-        lambda: IndirectShooting().build(van_der_pol()).run(x0=[np.nan, 0.0]),
     ],
 )
 def test_bad_options_and_data(make: Callable[[], object]) -> None:

@@ -22,9 +22,9 @@ from ocp import (
     solve,
 )
 from solvers import Kept, MultipleShooting, ReverseShooting, polish, seeds_around, self_motions
-from solvers.indirect.extremal import Schedule
 from solvers.indirect.reverse import Reverse
 from solvers.indirect.reverse_shooting import Boundary
+from solvers.indirect.segments import Schedule
 from tests.solvers.problems import changed, point
 from tests.tolerances import DERIVATIVE, ROUNDING, STATIONARY, STEP
 

@@ -1,0 +1,40 @@
+"""The unknowns that Newton begins with, from whatever a guess has to offer."""
+
+import numpy as np
+
+from ocp import Data, Start
+from solvers.indirect.extremal import Extremals
+from solvers.indirect.segments import Schedule
+
+
+def first_unknowns(
+    extremals: Extremals, data: Data, schedule: Schedule, guess: Start | None
+) -> np.ndarray:
+    """Return the unknowns of the boundary value problem, see ``Shape``.
+
+    What the guess lacks stands still: states at the start, costates zero.
+    """
+    shape, ocp = extremals.shape, extremals.ocp
+    nodes = np.linspace(0.0, 1.0, shape.segments + 1)
+    x = guess.sample("x", nodes, shape.nx) if guess else None
+    costate = guess.sample("costate", nodes, shape.nx) if guess else None
+    duration = (guess.duration if guess else None) or ocp.duration
+    x = np.tile(data.x0, (len(nodes), 1)) if x is None else x
+    if not ocp.has_free_start:
+        x = np.vstack([data.x0, x[1:]])
+    z = np.hstack([x, np.zeros_like(x) if costate is None else costate])
+    mu, nu = _balancing(extremals, z, schedule, duration)
+    return shape.join(z[:-1], mu, nu, duration)
+
+
+def _balancing(
+    extremals: Extremals, z: np.ndarray, schedule: Schedule, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the multipliers that best balance the costates of z at both ends."""
+    shape, nx = extremals.shape, extremals.shape.nx
+    mu, nu, t1 = np.zeros(shape.n_mu), np.zeros(shape.n_nu), schedule.t0 + duration
+    value, _, in_mu = extremals.starts(z[0], mu, schedule.t0, schedule.p_first)
+    mu = -np.linalg.lstsq(in_mu[-nx:], value[-nx:].ravel(), rcond=None)[0]
+    value, _, in_nu, _ = extremals.ends(z[-1], nu, t1, schedule.p_last)
+    nu = -np.linalg.lstsq(in_nu[:nx], value[:nx].ravel(), rcond=None)[0]
+    return mu, nu

@@ -1,0 +1,37 @@
+"""The sparse linear system of a Newton step: put together from blocks, and factorised."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+
+def assembled(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
+    """Return a matrix of blocks; None is a block of zeros.
+
+    Args:
+        rows: blocks (m, n) side by side; a column of None alone has no width.
+    """
+    columns = zip(*rows, strict=True)
+    widths = [next((b.shape[1] for b in column if b is not None), 0) for column in columns]
+    lefts = np.cumsum([0, *widths])
+    entries, top = [], 0
+    for row in rows:
+        for left, block in zip(lefts, row, strict=False):
+            if block is not None:
+                i, k = np.nonzero(block)
+                entries.append((block[i, k], top + i, left + k))
+        top += next(len(block) for block in row if block is not None)
+    data, i, k = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return sparse.csc_matrix((data, (i, k)), shape=(top, lefts[-1]))
+
+
+def factorised(jacobian: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the solve with a sparse LU factorisation; NaN if there is none."""
+    if not np.isfinite(jacobian.data).all():
+        return lambda r: np.full_like(r, np.nan)
+    try:
+        return splu(jacobian).solve
+    except RuntimeError:  # SuperLU: the factor is exactly singular
+        return lambda r: np.full_like(r, np.nan)
