@@ -7,6 +7,7 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
+from ocp.assembled import assembled
 from ocp.compile import compiled
 from ocp.constraint import Constraint
 from ocp.data import Data
@@ -107,7 +108,9 @@ class Transcription:
     @cached_property
     def step(self) -> ca.Function:
         """One interval: (x, u, t, h, p0, p1) -> (x after it, cost), ``Stage.step``."""
-        return self._fast(Stage.of(self.ocp, self.integrator, held=True).step)
+        if self.compiled:
+            return self._fast(assembled(self.ocp, self.integrator))
+        return Stage.of(self.ocp, self.integrator, held=True).step
 
     @cached_property
     def _path(self) -> ca.Function:
