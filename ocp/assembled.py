@@ -1,6 +1,7 @@
 """The step of a stage that brings its derivatives along, put together from those of one slope."""
 
 import casadi as ca
+import numpy as np
 
 from ocp.integrate import Integrator, Stage
 from ocp.problem import OCP
@@ -15,8 +16,9 @@ def assembled(ocp: OCP, integrator: Integrator) -> ca.Function:
 
     Who differentiates it with CasADi, twice at most, along state and control (and t and h where
     the final time is free), is given the Jacobian and the Jacobian of the adjoint made by
-    ``Tape``: but for rounding the numbers of ``Stage.step``, with the same sparsity. Their code
-    does not grow with the number of slopes and substeps. All other inputs count as constants.
+    ``Tape``: but for rounding the numbers of ``Stage.step``, with the same sparsity. The second
+    derivatives of a slope, which are most of the code, are written once, however many slopes and
+    substeps there are. All other inputs count as constants.
 
     Args:
         ocp: the problem.
@@ -30,21 +32,19 @@ def assembled(ocp: OCP, integrator: Integrator) -> ca.Function:
     tape = Tape.of(
         ocp, integrator, {name: s[name] for name in step.name_in()}, timed=ocp.has_free_time
     )
-    ends = [0, *(sum(s[name].numel() for name in along[: i + 1]) for i in range(len(along)))]
-    jacobian = {
-        (of, name): part
-        for of, rows in (("x_next", tape.along), ("cost", tape.gradient))
-        for name, part in zip(along, ca.horzsplit(rows, ends), strict=True)
-    }
-    hessian = ca.blocksplit(tape.hessian(s["adj_x_next"], s["adj_cost"]), ends, ends)
-    second = {
-        (f"adj_{of}", name): part
-        for of, parts in zip(along, hessian, strict=True)
-        for name, part in zip(along, parts, strict=True)
-    }
-    second |= {(f"adj_{name}", f"adj_{of}"): part.T for (of, name), part in jacobian.items()}
+    ends = np.cumsum([0, *(s[name].numel() for name in along)])
+    first = _blocks({"x_next": tape.along, "cost": tape.gradient}, along, ends)
+    rows = ca.vertsplit(tape.hessian(s["adj_x_next"], s["adj_cost"]), ends)
+    second = _blocks({f"adj_{of}": row for of, row in zip(along, rows, strict=True)}, along, ends)
+    second |= {(f"adj_{name}", f"adj_{of}"): block.T for (of, name), block in first.items()}
     adjoint = _bringing(adjoint, _jacobian(adjoint, second, s))
-    return _bringing(step, _jacobian(step, jacobian, s), adjoint)
+    return _bringing(step, _jacobian(step, first, s), adjoint)
+
+
+def _blocks(rows: dict[str, ca.MX], along: list[str], ends: np.ndarray) -> _Blocks:
+    """Return rows of a matrix cut into columns."""
+    cut = {of: zip(along, ca.horzsplit(row, ends), strict=True) for of, row in rows.items()}
+    return {(of, name): block for of, blocks in cut.items() for name, block in blocks}
 
 
 def _bringing(function: ca.Function, *derivatives: ca.Function) -> ca.Function:

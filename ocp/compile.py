@@ -107,15 +107,20 @@ def compiled(
         if function.is_diff_in() != options["is_diff_in"]:
             function = _tidied(function, options)
     try:
-        library = _library(_code(function, along), compiler or Compiler())
+        library = _library(c_code(function, along), compiler or Compiler())
         return _loaded(function.name(), library, options)
     except _Unbuildable as reason:
         _announce(f"no compiled functions: {reason}. They run interpreted.")
         return function
 
 
-def _code(function: ca.Function, along: Sequence[str]) -> str:
-    """Return the C of a function, and of what CasADi asks for to differentiate it twice."""
+def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:
+    """Return the C of a function, and of what CasADi asks for to differentiate it twice.
+
+    Args:
+        function: what to write.
+        along: inputs along which it is differentiated; with none there are no derivatives.
+    """
     functions = [function]
     if along:
         adjoint = function.reverse(1)

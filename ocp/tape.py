@@ -1,4 +1,4 @@
-"""A held stage, walked through slope by slope: forwards for the Jacobian, backwards for the Hessian."""
+"""A held stage, slope by slope: forwards for the Jacobian, backwards for the Hessian."""
 
 from dataclasses import dataclass, field
 
