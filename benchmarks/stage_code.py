@@ -11,7 +11,7 @@ from rich.table import Table
 
 from benchmarks.arm_speed import N, arm
 from ocp import OCP, RK4, Compiler, Solver, Stage, assembled, c_code, curvature
-from solvers import MultipleShooting, StagewiseNewton
+from solvers import MultipleShooting
 
 _CACHE = "XDG_CACHE_HOME"
 _ALONG = ("x", "u0")
@@ -26,15 +26,15 @@ class StageCode:
         written_out: characters of C with the derivatives that CasADi writes out by itself.
         assembled: the same with those put together from one slope.
         curvature: of the function of ``StagewiseNewton``.
-        builds: processor time [s] of two builds with nothing in the cache, the compiler's
-            included: compiled fatrop, and ``StagewiseNewton``.
+        build: processor time [s] of compiled fatrop with nothing in the cache, the compiler's
+            included.
     """
 
     links: int
     written_out: int
     assembled: int
     curvature: int
-    builds: tuple[float, float]
+    build: float
 
     @property
     def optimised(self) -> bool:
@@ -51,7 +51,7 @@ class StageCode:
             written_out=len(c_code(_written_out(ocp), _ALONG)),
             assembled=len(c_code(assembled(ocp, RK4()), _ALONG)),
             curvature=len(c_code(curvature(ocp, RK4()))),
-            builds=(_build(fatrop, ocp), _build(StagewiseNewton(N, compiled=True), ocp)),
+            build=_build(fatrop, ocp),
         )
 
 
@@ -65,8 +65,7 @@ def code_table(codes: Sequence[StageCode]) -> Table:
             name.replace("_", " "), *(f"{getattr(code, name) / 1e3:.0f}" for code in codes)
         )
     table.add_row("assembled is optimised", *("yes" if code.optimised else "no" for code in codes))
-    for i, name in enumerate(("direct, fatrop", "stagewise Newton")):
-        table.add_row(f"build of {name} [s]", *(f"{code.builds[i]:.1f}" for code in codes))
+    table.add_row("build of direct, fatrop [s]", *(f"{code.build:.1f}" for code in codes))
     return table
 
 
