@@ -1,7 +1,8 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
+from ocp.assembled import assembled
 from ocp.buffered import Buffered
-from ocp.compile import Compiler, InterpretedWarning, compiled
+from ocp.compile import Compiler, InterpretedWarning, c_code, compiled
 from ocp.constraint import Box, Constraint
 from ocp.curvature import curvature
 from ocp.data import Data
@@ -93,7 +94,9 @@ __all__ = [
     "Transcription",
     "UnsupportedProblem",
     "Work",
+    "assembled",
     "bernstein",
+    "c_code",
     "closed_loop",
     "compiled",
     "costates_along",

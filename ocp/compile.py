@@ -84,7 +84,8 @@ def compiled(
     the interpreted function comes back, and ``InterpretedWarning`` says why, once per reason.
 
     Meant for functions of the size of one stage; map them afterwards. A whole transcribed
-    problem takes minutes to compile.
+    problem takes minutes to compile. A function that brings its derivatives along, such as
+    ``assembled``, keeps them.
 
     Args:
         function: what to compile.
@@ -102,25 +103,32 @@ def compiled(
     options = {}
     if along:
         options = {"is_diff_in": [name in along for name in function.name_in()]}
-        function = _tidied(function, options)
+        # Tidied, a function that brings its derivatives along would lose them.
+        if function.is_diff_in() != options["is_diff_in"]:
+            function = _tidied(function, options)
     try:
-        library = _library(_code(function, along), compiler or Compiler())
+        library = _library(c_code(function, along), compiler or Compiler())
         return _loaded(function.name(), library, options)
     except _Unbuildable as reason:
         _announce(f"no compiled functions: {reason}. They run interpreted.")
         return function
 
 
-def _code(function: ca.Function, along: Sequence[str]) -> str:
-    """Return the C of a function, and of what CasADi asks for to differentiate it twice."""
-    functions = [_tidied(function)]
+def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:
+    """Return the C of a function, and of what CasADi asks for to differentiate it twice.
+
+    Args:
+        function: what to write.
+        along: inputs along which it is differentiated; with none there are no derivatives.
+    """
+    functions = [function]
     if along:
-        adjoint = functions[0].reverse(1)
-        functions += [_tidied(f) for f in (functions[0].jacobian(), adjoint, adjoint.jacobian())]
+        adjoint = function.reverse(1)
+        functions += [function.jacobian(), adjoint, adjoint.jacobian()]
     generator = ca.CodeGenerator(_UNIT)
     try:
         for each in functions:
-            generator.add(each)
+            generator.add(_tidied(each))
         return generator.dump()
     except RuntimeError as error:  # a node of the graph that CasADi cannot write as C
         raise _Unbuildable(f"{function.name()} cannot be written as C ({error})") from error

@@ -6,6 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ocp.assembled import assembled
 from ocp.compile import compiled
 from ocp.data import Data
 from ocp.functions import stacked
@@ -90,7 +91,9 @@ class Transcription:
     @cached_property
     def step(self) -> ca.Function:
         """One interval: (x, u, t, h, p0, p1) -> (x after it, cost), ``Stage.step``."""
-        return self._fast(Stage.of(self.ocp, self.integrator, held=True).step)
+        if self.compiled:
+            return self._fast(assembled(self.ocp, self.integrator))
+        return Stage.of(self.ocp, self.integrator, held=True).step
 
     @cached_property
     def _path(self) -> ca.Function:

@@ -106,9 +106,9 @@ def _certified() -> list[Case]:
 
 def _gaps(case: Case, solver: Schuetz, starts: int = 1) -> list[tuple[float, Status]]:
     """The referee's gap [%] and how the descent ended, for each start."""
-    program = solver.build(case.build())
-    found = []
-    for guess in (None, *random_guesses(program.ocp, starts - 1, _SEED, _AMPLITUDE)):
+    ocp, found = case.build(), []
+    program = solver.build(ocp)
+    for guess in (None, *random_guesses(ocp, starts - 1, _SEED, _AMPLITUDE)):
         solution = program.run(guess=guess)
         gap = case.gap(evaluate(solution, tolerance=_ACCURACY).cost)
         assert gap is not None

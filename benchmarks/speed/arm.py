@@ -82,7 +82,7 @@ def arm_steps(
 
     The motion is that of the first contender; everybody sees it with the same noise.
     """
-    guess = solve(ocp, MultipleShooting(N)).or_raise()
+    guess = solve(ocp, MultipleShooting(N, compiled=True)).or_raise()
     racing = {
         (name, compiled): MPC(
             ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"), guess=guess, compiled=compiled

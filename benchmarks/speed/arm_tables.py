@@ -17,6 +17,7 @@ from benchmarks.speed.arm import (
     stagewise,
 )
 from benchmarks.speed.driver_overhead import driver_overhead, overhead_line
+from benchmarks.speed.stage_code import StageCode, code_table
 
 
 def print_arm_speed(
@@ -34,6 +35,7 @@ def print_arm_speed(
         # Interpreted, and for the other solvers, ten links take minutes.
         grown = {n: arm_steps(stagewise(), arm(n), count, (True,)) for n in links}
         console.print(growth_table(grown, f"N = {N}: one step in ms over the links"))
+        console.print(code_table([StageCode.of(n) for n in links]))
     console.print(overhead_line(driver_overhead()), highlight=False, soft_wrap=True)
 
 

@@ -5,6 +5,8 @@ import pytest
 from benchmarks.speed.arm import Steps, arm, arm_steps, exponent
 from benchmarks.speed.arm_tables import growth_table, ratio_table
 from benchmarks.speed.driver_overhead import driver_overhead, overhead_line
+from benchmarks.speed.stage_code import StageCode, code_table
+from ocp import Compiler
 from solvers import Schuetz
 
 
@@ -31,3 +33,18 @@ def test_interpreted_and_compiled_steps_are_both_planned():
 def test_the_drivers_own_time_is_told():
     line = overhead_line(driver_overhead(count=10))
     assert "flight recorder" in line
+
+
+def test_code_beyond_the_compilers_limit_is_named():
+    short, long = (StageCode(3, 9, size, 5, 1.0) for size in (7, Compiler().optimised + 1))
+    assert short.optimised
+    assert not long.optimised
+    assert code_table([short, long]).row_count == 5
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Compiler().found, reason="no compiler on this machine")
+def test_put_together_a_stage_takes_less_code():
+    code = StageCode.of(3)
+    assert code.curvature < code.assembled < code.written_out / 2
+    assert code.build > 0.0
