@@ -86,9 +86,8 @@ def _refuse(ocp: OCP) -> None:
         raise UnsupportedProblem(
             f"{ocp.name}: stagewise Newton takes no {c.at} constraint ('{c.name}')"
         )
-    for what, box in (("control", ocp.control_bounds), ("state", ocp.state_bounds)):
-        if box.is_active:
-            raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no {what} bounds")
+    if ocp.state_bounds.is_active:
+        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no state bounds")
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no free final time")
 
@@ -124,7 +123,8 @@ class StagewiseNewtonProgram(Program):
         solver = self.solver
         descent = Descent(self.step, [*schedule, final], solver.tolerance, solver.max_iterations)
         status = descent.descend(self._first_iterate(data, guess or ocp.guess))
-        x, u = descent.here.x.T, descent.here.u.T
+        found = descent.view
+        x, u = found.at.x.T, found.at.u.T
         message = descent.message
         t = data.t0 + self.intervals.fractions * ocp.duration
         if status.is_success:
@@ -140,12 +140,12 @@ class StagewiseNewtonProgram(Program):
             t=t,
             x=x,
             x0=data.x0,
-            costate=descent.here.costate.T,
+            costate=found.at.costate.T,
             u=u,
-            cost=descent.view.cost if np.isfinite(descent.view.cost) else np.inf,
-            residual=descent.view.residual if descent.view.is_finite else np.inf,
+            cost=found.cost if np.isfinite(found.cost) else np.inf,
+            residual=found.residual if found.is_finite else np.inf,
             iterations=len(descent.costs) - 1,
-            work=Work(*[descent.views] * 3),
+            work=Work(descent.views, descent.views, descent.sweeps),
             history={
                 "cost": np.array(descent.costs),
                 "residual": np.array(descent.residuals),
