@@ -8,28 +8,28 @@ from ocp import Box
 
 # Violations and slopes below this, relative to what they are made of, are rounding.
 _ROUNDING = 1e-12
-# How often all wrong controls may be exchanged at once without their number falling.
-_PATIENCE = 3
-# Most exchanges.
-_LIMIT = 60
+# Most exchanges: a good guess takes one or two, and without end none is worth while.
+_LIMIT = 25
 
 
 @dataclass(eq=False)
 class Clamped:
-    r"""The active set of a quadratic program whose only inequalities are lower <= u + du <= upper.
+    r"""The active set of a quadratic program whose only inequalities are bounds of controls.
 
     With some controls clamped at their bounds the others follow from one recursion. The choice
-    is right if no free control leaves its bounds, and the slope g of the cost in a clamped one
-    has the sign of a multiplier: g >= 0 at a lower bound, g <= 0 at an upper one. Otherwise those
-    that are wrong change: the free ones are clamped at the bound they violate, the clamped ones are freed.
-    Done for all at once this is Newton's method [Hintermueller, Ito & Kunisch 2002], right after
-    one or two recursions from a good guess. From a bad one it may cycle: where the number of wrong
-    controls has not fallen for three times, only the last wrong one is exchanged until it falls, which ends after
-    finitely many where the program is strictly convex [Judice & Pires 1994].
+    is right if no free control leaves its bounds, and the slope g of the cost in each clamped one
+    has the sign of its multiplier: g >= 0 at a lower bound, g <= 0 at an upper one. Those that
+    are wrong are exchanged: free ones are clamped at the bound that they leave, clamped ones
+    freed. All at once this is Newton's method, done after one or two recursions from a good
+    guess [Hintermueller, Ito & Kunisch 2002]. From a bad one it may cycle; where the number of
+    wrong ones does not fall, only the last of them is exchanged until it does, which ends after
+    finitely many recursions where the program is strictly convex [Judice & Pires 1994]. That
+    may be many: to wait for it is not worth while, since with a shift of the second derivative
+    it takes few.
 
     Attributes:
         room: from the controls to their lower and to their upper bounds, (nu, N) each.
-        side: -1: at its lower bound, 1: at its upper one, 0: free (nu, N).
+        side: -1: at the lower bound, 1: at the upper one, 0: free, (nu, N).
         scale: of the slopes, 1 + largest abs(p).
     """
 
@@ -39,14 +39,13 @@ class Clamped:
     _wrong: np.ndarray = field(init=False)
     _next: np.ndarray = field(init=False)
     _fewest: float = field(default=np.inf, init=False)
-    _patience: int = field(default=_PATIENCE, init=False)
     _left: int = field(default=_LIMIT, init=False)
 
     @classmethod
     def at(cls, u: np.ndarray, pull: np.ndarray, bounds: Box, scale: float) -> "Clamped":
-        """Begin with those at a bound that the slope ``pull`` of the cost holds there."""
-        below, above = (np.asarray(b)[:, None] - u for b in (bounds.lower, bounds.upper))
-        low, high = (pull > 0.0) & (below >= -pull), (pull < 0.0) & (above <= -pull)
+        """Begin with those that a step along the slopes ``pull`` of the cost takes to a bound."""
+        below, above = (np.asarray(bound)[:, None] - u for bound in (bounds.lower, bounds.upper))
+        low, high = (pull > 0.0) & (-pull <= below), (pull < 0.0) & (-pull >= above)
         side = high.astype(int) - low
         side[below == above] = -1
         return cls((below, above), side, scale)
@@ -62,32 +61,24 @@ class Clamped:
         below, above = self.room
         return np.where(self.side < 0, below, np.where(self.side > 0, above, 0.0))
 
-    def suits(self, du: np.ndarray, pull: np.ndarray) -> bool:
-        """Return whether the choice is right, for the step and the slopes it has led to."""
-        (below, above), side = self.room, self.side
+    def suits(self, du: np.ndarray, slope: np.ndarray) -> bool:
+        """Return whether the choice is right, by the step and the slopes g that it has led to."""
+        (below, above), free = self.room, self.side == 0
         slack, flat = _ROUNDING * (1.0 + np.abs(du)), _ROUNDING * self.scale
-        low = (side == 0) & (du < below - slack)
-        high = (side == 0) & (du > above + slack)
-        freed = (side * pull > flat) & (below < above)
-        self._wrong = low | high | freed
+        low, high = free & (du < below - slack), free & (du > above + slack)
+        self._wrong = low | high | ((self.side * slope > flat) & (below < above))
         self._next = high.astype(int) - low
         return not self._wrong.any()
 
     def exchange(self) -> bool:
         """Change the choice; False: it was changed too often."""
-        count = int(self._wrong.sum())
-        if self._left == 0:
-            return False
         self._left -= 1
+        wrong, count = self._wrong, int(self._wrong.sum())
         if count < self._fewest:
-            self._fewest, self._patience = count, _PATIENCE
+            self._fewest = count
         else:
-            self._patience -= 1
-        wrong = self._wrong
-        if self._patience < 0:
-            # In the order of time the last one, within a stage the last component.
-            stage, component = np.argwhere(wrong.T)[-1]
+            stages, components = np.nonzero(wrong.T)
             wrong = np.zeros_like(wrong)
-            wrong[component, stage] = True
+            wrong[components[-1], stages[-1]] = True
         self.side = np.where(wrong, self._next, self.side)
-        return True
+        return self._left >= 0
