@@ -30,25 +30,23 @@ class Clamped:
     Attributes:
         room: from the controls to their lower and to their upper bounds, (nu, N) each.
         side: -1: at the lower bound, 1: at the upper one, 0: free, (nu, N).
-        scale: of the slopes, 1 + largest abs(p).
     """
 
     room: tuple[np.ndarray, np.ndarray]
     side: np.ndarray
-    scale: float
     _wrong: np.ndarray = field(init=False)
     _next: np.ndarray = field(init=False)
     _fewest: float = field(default=np.inf, init=False)
     _left: int = field(default=_LIMIT, init=False)
 
     @classmethod
-    def at(cls, u: np.ndarray, pull: np.ndarray, bounds: Box, scale: float) -> "Clamped":
+    def at(cls, u: np.ndarray, pull: np.ndarray, bounds: Box) -> "Clamped":
         """Begin with those that a step along the slopes ``pull`` of the cost takes to a bound."""
         below, above = (np.asarray(bound)[:, None] - u for bound in (bounds.lower, bounds.upper))
         low, high = (pull > 0.0) & (-pull <= below), (pull < 0.0) & (-pull >= above)
         side = high.astype(int) - low
         side[below == above] = -1
-        return cls((below, above), side, scale)
+        return cls((below, above), side)
 
     @property
     def chosen(self) -> np.ndarray:
@@ -61,10 +59,16 @@ class Clamped:
         below, above = self.room
         return np.where(self.side < 0, below, np.where(self.side > 0, above, 0.0))
 
-    def suits(self, du: np.ndarray, slope: np.ndarray) -> bool:
-        """Return whether the choice is right, by the step and the slopes g that it has led to."""
+    def suits(self, du: np.ndarray, slope: np.ndarray, scale: float) -> bool:
+        """Return whether the choice is right, by the step and the slopes g that it has led to.
+
+        Args:
+            du: the step (nu, N).
+            slope: g (nu, N), 0 for the free controls.
+            scale: of what slopes are made of.
+        """
         (below, above), free = self.room, self.side == 0
-        slack, flat = _ROUNDING * (1.0 + np.abs(du)), _ROUNDING * self.scale
+        slack, flat = _ROUNDING * (1.0 + np.abs(du)), _ROUNDING * scale
         low, high = free & (du < below - slack), free & (du > above + slack)
         self._wrong = low | high | ((self.side * slope > flat) & (below < above))
         self._next = high.astype(int) - low

@@ -143,14 +143,18 @@ class NewtonStep:
                 closed it is added to the second derivative of the cost as a function of the
                 controls alone, which is positive definite if and only if every Q_uu is.
         """
-        clamped = Clamped.at(view.at.u, view.pull, self.bounds, 1.0 + view.largest_costate)
-        sweeps = 0
+        if not self.bounds.is_active:
+            none = np.zeros_like(view.at.u)
+            law, pivots, _, _, numbers = self.sweep(*view.derivatives, sigma, none, none)
+            return Step(law, pivots, True, 1, *numbers.ravel().tolist())
+        clamped, sweeps = Clamped.at(view.at.u, view.pull, self.bounds), 0
         while True:
-            found = self.sweep(*view.derivatives, sigma, clamped.chosen, clamped.moves)
+            chosen = clamped.chosen, clamped.moves
+            law, pivots, du, slope, numbers = self.sweep(*view.derivatives, sigma, *chosen)
             sweeps += 1
-            law, pivots, du, pull, numbers = found
-            step = Step(law, pivots, clamped.suits(du, pull), sweeps, *numbers.ravel().tolist())
-            if step.is_settled or not step.is_convex or not clamped.exchange():
+            fits = clamped.suits(du, slope, 1.0 + view.largest_costate)
+            step = Step(law, pivots, fits, sweeps, *numbers.ravel().tolist())
+            if fits or not step.is_convex or not clamped.exchange():
                 return step
 
     def moved(self, step: Step, view: View, share: float, schedule: list[np.ndarray]) -> Iterate:
