@@ -60,7 +60,7 @@ def look(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> ca.Function
     return ca.Function("look", [s[name] for name in names], results)
 
 
-def sweep(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> ca.Function:  # noqa: ARG001
+def sweep(ocp: OCP, n: int, *, fast: bool) -> ca.Function:
     """Return the recursion: backwards for the law, forwards for the step of the linear model.
 
     Returns:

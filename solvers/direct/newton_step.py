@@ -120,8 +120,13 @@ class NewtonStep:
     @classmethod
     def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "NewtonStep":
         """Build it; ``fast``: stage and recursion as machine code."""
-        functions = (make(ocp, n, integrator, fast=fast) for make in (look, sweep, move))
-        return cls(*map(Buffered, functions), ocp.control_bounds)
+        looking, going = (make(ocp, n, integrator, fast=fast) for make in (look, move))
+        return cls(
+            look=Buffered(looking),
+            sweep=Buffered(sweep(ocp, n, fast=fast)),
+            go=Buffered(going),
+            bounds=ocp.control_bounds,
+        )
 
     def view(self, at: Iterate, schedule: list[np.ndarray]) -> View:
         """Evaluate all stages.
