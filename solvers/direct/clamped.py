@@ -9,7 +9,7 @@ from ocp import Box
 # Violations and slopes below this, relative to what they are made of, are rounding.
 _ROUNDING = 1e-12
 # Most exchanges: a good guess takes one or two, and without end none is worth while.
-_LIMIT = 25
+_LIMIT = 15
 
 
 @dataclass(eq=False)

@@ -19,19 +19,19 @@ def backwards(nx: int, nu: int) -> ca.Function:
         Q_{uu} = H_{uu} + \sigma E + B'PB, \quad Q_{ux} = H_{ux} + B'PA, \quad
         Q_u = r + B'(v + Pc), \quad du = K dx + \kappa.
 
-    Some controls, the clamped ones, are told their move: there K = 0 and kappa is the move. The
-    free ones f minimise what is left, and leave the clamped ones c a slope g:
+    Some controls b, the clamped ones, are told their move: there K = 0 and kappa is the move. The
+    free ones f minimise what is left, and leave the clamped ones a slope g:
 
     .. math::
-        (K, \kappa)_f = -Q_{ff}^{-1} (Q_{fx}, \; Q_f + Q_{fc} \kappa_c), \quad
+        (K, \kappa)_f = -Q_{ff}^{-1} (Q_{fx}, \; Q_f + Q_{fb} \kappa_b), \quad
         g = Q_u + Q_{ux} dx + Q_{uu} du,
 
     .. math::
         P \leftarrow H_{xx} + A'PA + Q_{ux}'K, \quad
         v \leftarrow q + A'(v + Pc) + Q_{ux}'\kappa.
 
-    The value keeps its form since g_f = 0 and K_c = 0: K'(Q_u + Q_uu kappa) and K'(Q_ux + Q_uu K)
-    vanish. Source: [Dunn & Bertsekas 1989]; thesis (2.24) for the linear case.
+    since K'(Q_ux + Q_uu K) and K'(Q_u + Q_uu kappa) vanish, row by row.
+    Source: [Dunn & Bertsekas 1989]; thesis (2.24) for the linear case.
 
     Returns:
         a function of ((P, v) (nx, nx + 1), H, (A, B), (q, r), c, sigma, whether a control is

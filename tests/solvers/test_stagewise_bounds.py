@@ -46,7 +46,7 @@ def upright() -> OCP:
 def upright_from_a_line() -> OCP:
     """The states of the first guess run straight to the top: gaps that 20 N cannot close."""
     up = [0.0, np.pi, 0.0, 0.0]
-    start = np.array([0.0, np.pi - 0.4, 0.0, 0.0])
+    start = [0.0, np.pi - 0.4, 0.0, 0.0]
     return changed(cart_pole_upright(track=np.inf), x0=start, guess=Guess(x=[start, up], u=[0.0]))
 
 
