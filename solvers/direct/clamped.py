@@ -28,25 +28,24 @@ class Clamped:
     it takes few.
 
     Attributes:
-        room: from the controls to their lower and to their upper bounds, (nu, N) each.
+        below: from the controls to their lower bounds, (nu, N).
+        above: to their upper ones.
         side: -1: at the lower bound, 1: at the upper one, 0: free, (nu, N).
     """
 
-    room: tuple[np.ndarray, np.ndarray]
+    below: np.ndarray
+    above: np.ndarray
     side: np.ndarray
     _wrong: np.ndarray = field(init=False)
-    _next: np.ndarray = field(init=False)
+    _off: np.ndarray = field(init=False)
     _fewest: float = field(default=np.inf, init=False)
     _left: int = field(default=_LIMIT, init=False)
 
     @classmethod
     def at(cls, u: np.ndarray, pull: np.ndarray, bounds: Box) -> "Clamped":
-        """Begin with those that a step along the slopes ``pull`` of the cost takes to a bound."""
-        below, above = (np.asarray(bound)[:, None] - u for bound in (bounds.lower, bounds.upper))
-        low, high = (pull > 0.0) & (-pull <= below), (pull < 0.0) & (-pull >= above)
-        side = high.astype(int) - low
-        side[below == above] = -1
-        return cls((below, above), side)
+        """Begin with those that a step against the slopes ``pull`` of the cost takes out."""
+        below, above = np.asarray(bounds.lower)[:, None] - u, np.asarray(bounds.upper)[:, None] - u
+        return cls(below, above, (above < -pull).astype(float) - (-pull < below))
 
     @property
     def chosen(self) -> np.ndarray:
@@ -56,22 +55,21 @@ class Clamped:
     @property
     def moves(self) -> np.ndarray:
         """How far the clamped controls are from their bounds, 0 for the free ones (nu, N)."""
-        below, above = self.room
-        return np.where(self.side < 0, below, np.where(self.side > 0, above, 0.0))
+        return np.where(self.side < 0, self.below, np.where(self.side > 0, self.above, 0.0))
 
     def suits(self, du: np.ndarray, slope: np.ndarray, scale: float) -> bool:
         """Return whether the choice is right, by the step and the slopes g that it has led to.
 
+        Both conditions at once: du = clip(du - g), since g = 0 where a control is free and du is
+        at a bound where it is clamped.
+
         Args:
             du: the step (nu, N).
-            slope: g (nu, N), 0 for the free controls.
-            scale: of what slopes are made of.
+            slope: g (nu, N).
+            scale: of what steps and slopes are made of.
         """
-        (below, above), free = self.room, self.side == 0
-        slack, flat = _ROUNDING * (1.0 + np.abs(du)), _ROUNDING * scale
-        low, high = free & (du < below - slack), free & (du > above + slack)
-        self._wrong = low | high | ((self.side * slope > flat) & (below < above))
-        self._next = high.astype(int) - low
+        self._off = du - np.minimum(np.maximum(du - slope, self.below), self.above)
+        self._wrong = np.abs(self._off) > _ROUNDING * scale
         return not self._wrong.any()
 
     def exchange(self) -> bool:
@@ -84,5 +82,6 @@ class Clamped:
             stages, components = np.nonzero(wrong.T)
             wrong = np.zeros_like(wrong)
             wrong[components[-1], stages[-1]] = True
-        self.side = np.where(wrong, self._next, self.side)
+        other = np.where(self.side == 0.0, np.sign(self._off), 0.0)
+        self.side = np.where(wrong, other, self.side)
         return self._left >= 0

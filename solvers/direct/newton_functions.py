@@ -10,7 +10,7 @@ def _symbols(ocp: OCP, n: int) -> dict[str, ca.MX]:
     nx, nu, n_p = ocp.model.nx, ocp.model.nu, ocp.p.numel()
     nw = nx + nu
     shapes = {"x": (nx, n + 1), "u": (nu, n), "costate": (nx, n + 1)}
-    shapes |= {"share": (1, 1), "law": (2 * nw, (nx + 1) * n), "gap": (nx, n)}
+    shapes |= {"share": (1, 1), "law": (nw, (nx + 1) * n), "gap": (nx, n)}
     shapes |= {"jacobian": (nx, nw * n), "slope": (nw, n), "hessian": (nw, nw * n)}
     shapes |= {"end_slope": (nx, 1), "end_hessian": (nx, nx)}
     shapes |= {"sigma": (1, 1), "clamped": (nu, n), "move": (nu, n)}
@@ -76,10 +76,10 @@ def sweep(ocp: OCP, n: int, *, fast: bool) -> ca.Function:
     stages = [s[name] for name in ("hessian", "jacobian", "slope")]
     others = [each[:, backwards_in_time] for each in (gap, s["clamped"], s["move"])]
     shift = ca.repmat(s["sigma"], 1, n)
-    _, law, pivots = back.mapaccum(n)(start, *stages, others[0], shift, *others[1:])
+    _, law, effect, pivots = back.mapaccum(n)(start, *stages, others[0], shift, *others[1:])
     in_order = [(nx + 1) * k + i for k in backwards_in_time for i in range(nx + 1)]
-    law = law[:, in_order]
-    dx, du, dcostate, left = run.mapaccum(n)(ca.MX.zeros(nx), law)
+    law, effect = law[:, in_order], effect[:, in_order]
+    dx, du, dcostate, left = run.mapaccum(n)(ca.MX.zeros(nx), law, effect)
     dx = ca.horzcat(ca.MX.zeros(nx), dx)
     dcostate = ca.horzcat(dcostate, s["end_hessian"] @ dx[:, -1] + s["end_slope"])
     slope = s["slope"][:, backwards_in_time]

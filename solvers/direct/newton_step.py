@@ -73,7 +73,7 @@ class Step:
     """A step to the minimum of the quadratic model within the bounds of the controls.
 
     Attributes:
-        law: for every stage (2 nx + 2 nu, nx + 1), see ``backwards``, side by side.
+        law: for every stage (nu + nx, nx + 1), see ``backwards``, side by side.
         pivots: of every Q_uu among the free controls, relative to its diagonal, (nu, N).
         is_settled: whether the clamped controls are the right ones: no free one leaves its
             bounds, none is held at a bound that it would leave.

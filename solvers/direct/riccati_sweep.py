@@ -35,9 +35,9 @@ def backwards(nx: int, nu: int) -> ca.Function:
 
     Returns:
         a function of ((P, v) (nx, nx + 1), H, (A, B), (q, r), c, sigma, whether a control is
-        clamped as 0 or 1 (nu,), its move (nu,) or 0) that returns the value before, the law
-        (2 nx + 2 nu, nx + 1) with the rows of (dx after, du, P dx + v, g) as functions of
-        (dx, 1), and the pivots of Q_ff over the diagonal (nu,), 1 for a clamped control: all are
+        clamped as 0 or 1 (nu,), its move (nu,) or 0) that returns the value before; as functions
+        of (dx, 1) the law (nu + nx, nx + 1) with the rows of (du, dp = P dx + v), and what it
+        leads to, (dx after, g); and the pivots of Q_ff over the diagonal (nu,), 1 for a clamped control: all are
         positive if and only if it is positive definite.
     """
     nw = nx + nu
@@ -59,15 +59,17 @@ def backwards(nx: int, nu: int) -> ca.Function:
     after = ca.horzcat(jacobian[:, :nx], gap) + jacobian[:, nx:] @ gains
     left = ca.diag(clamped) @ (q + q_uu @ gains)
     inputs = [value, hessian, jacobian, slope, gap, sigma, clamped, move]
-    outputs = [before, ca.vertcat(after, gains, before, left), pivots]
+    outputs = [before, ca.vertcat(gains, before), ca.vertcat(after, left), pivots]
     return ca.Function("backwards", inputs, ca.cse([ca.densify(o) for o in outputs]))
 
 
 def forwards(nx: int, nu: int) -> ca.Function:
-    """Return what the law says of the linear model: (dx, law) -> (dx after, du, dp, g)."""
-    dx, law = ca.SX.sym("dx", nx), ca.SX.sym("law", 2 * (nx + nu), nx + 1)
-    outputs = ca.vertsplit(law @ ca.vertcat(dx, 1), [0, nx, nx + nu, 2 * nx + nu, 2 * (nx + nu)])
-    return ca.Function("forwards", [dx, law], outputs)
+    """Return what the law says of the linear model: (dx, law, effect) -> (dx after, du, dp, g)."""
+    nw, dx = nx + nu, ca.SX.sym("dx", nx)
+    law, effect = ca.SX.sym("law", nw, nx + 1), ca.SX.sym("effect", nw, nx + 1)
+    du, dcostate = ca.vertsplit(law @ ca.vertcat(dx, 1), [0, nu, nw])
+    after, left = ca.vertsplit(effect @ ca.vertcat(dx, 1), [0, nx, nw])
+    return ca.Function("forwards", [dx, law, effect], [after, du, dcostate, left])
 
 
 def follow(step: ca.Function, bounds: Box) -> ca.Function:
@@ -88,9 +90,9 @@ def follow(step: ca.Function, bounds: Box) -> ca.Function:
     """
     nx, nu = step.size1_in(0), step.size1_in(1)
     y, share, gap = ca.SX.sym("y", nx), ca.SX.sym("share"), ca.SX.sym("gap", nx)
-    law = ca.SX.sym("law", 2 * (nx + nu), nx + 1)
+    law = ca.SX.sym("law", nu + nx, nx + 1)
     x, u, costate = ca.SX.sym("x", nx), ca.SX.sym("u", nu), ca.SX.sym("costate", nx)
-    moves = law[nx : 2 * nx + nu, :] @ ca.vertcat(y - x, share)
+    moves = law @ ca.vertcat(y - x, share)
     control = clipped(u + moves[:nu], bounds)
     rest: list = [ca.SX.sym(step.name_in(i), step.size_in(i)) for i in range(2, 6)]
     after, _ = step.call([y, control, *rest])

@@ -218,13 +218,12 @@ def linear_model(newton: NewtonStep, view, step) -> tuple[np.ndarray, ...]:
     dx, du, dp = np.zeros((nx, n + 1)), np.zeros((nu, n)), np.zeros((nx, n + 1))
     for k in range(n):
         law = step.law[:, (nx + 1) * k : (nx + 1) * (k + 1)] @ np.append(dx[:, k], 1.0)
-        du[:, k], dp[:, k] = law[nx : nx + nu], law[nx + nu : 2 * nx + nu]
+        du[:, k], dp[:, k] = law[:nu], law[nu:]
         last_first = (nx + nu) * (n - 1 - k)
         moved = np.append(dx[:, k], du[:, k])
         dx[:, k + 1] = (
             jacobian[:, last_first : last_first + nx + nu] @ moved + view.gap_by_stage[:, k]
         )
-        np.testing.assert_allclose(law[:nx], dx[:, k + 1], atol=1e-10)
     dp[:, n] = end_hessian @ dx[:, n] + end_slope[:, 0]
     return dx, du, dp
 
