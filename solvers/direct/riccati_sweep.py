@@ -37,8 +37,8 @@ def backwards(nx: int, nu: int) -> ca.Function:
         a function of ((P, v) (nx, nx + 1), H, (A, B), (q, r), c, sigma, whether a control is
         clamped as 0 or 1 (nu,), its move (nu,) or 0) that returns the value before; as functions
         of (dx, 1) the law (nu + nx, nx + 1) with the rows of (du, dp = P dx + v), and what it
-        leads to, (dx after, g); and the pivots of Q_ff over the diagonal (nu,), 1 for a clamped control: all are
-        positive if and only if it is positive definite.
+        leads to, (dx after, g); and the pivots of Q_ff over its diagonal (nu,), 1 for a clamped
+        control: all are positive if and only if it is positive definite.
     """
     nw = nx + nu
     value, hessian = ca.SX.sym("value", nx, nx + 1), ca.SX.sym("hessian", nw, nw)
