@@ -31,8 +31,8 @@ class Descent:
 
     A step is computed with the exact second derivative, and its law followed by the model itself
     (``NewtonStep.moved``): the first full step closes all gaps, and from then on the merit is the
-    cost. Where a Q_uu is not positive definite
-    the shift sigma grows until all of them are, so that the step leads downhill; where no share
+    cost. Where a Q_uu is not positive definite, or the controls at bounds are not found, the
+    shift sigma grows until all of them are, so that the step leads downhill; where no share
     of a step is accepted it grows as well. The end is judged without it: it is a minimum only
     if all Q_uu are positive definite there (the second-order condition of the discretised
     problem). From a stationary point that has negative curvature the controls are pushed away

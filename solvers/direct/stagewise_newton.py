@@ -1,4 +1,4 @@
-"""Newton's method stage by stage: the quickest way to a minimum without inequalities."""
+"""Newton's method stage by stage: the quickest way to a minimum within bounds of the controls."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,12 +36,19 @@ class StagewiseNewton(Solver):
     step of the integrator each, the gaps between them closed at the end. One Newton step with
     the exact second derivative of the Lagrangian costs one evaluation of every stage and one
     recursion: effort linear in N. Where that derivative is not convex on the controls it is
-    shifted (see ``NewtonStep.view``), and steps are shortened by a line search on an exact
-    penalty function. ``SOLVED`` stands for a strict local minimum of the discretised problem:
-    the unshifted recursion has only positive definite Q_uu there.
+    shifted (see ``NewtonStep.step``), and steps are shortened by a line search on an exact
+    penalty function.
 
-    Refuses every bound and constraint, a free start and a free final time.
-    Source: [Dunn & Bertsekas 1989], [Rao, Wright & Rawlings 1998].
+    Controls at a bound are clamped inside the recursion, which is repeated, without new
+    derivatives, until the right ones are (see ``Clamped``): one to three times from a plan of
+    the step before, more from afar. No iterate is ever out of bounds, not by rounding either.
+
+    ``SOLVED`` stands for a strict local minimum of the discretised problem: the unshifted
+    recursion has only positive definite Q_uu there, among the controls that are not at a bound
+    with a multiplier.
+
+    Refuses state bounds and every constraint, a free start and a free final time.
+    Source: [Dunn & Bertsekas 1989], [Hintermueller, Ito & Kunisch 2002].
 
     Args:
         intervals: number of intervals, with one held control each; a discrete-time problem
