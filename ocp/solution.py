@@ -167,11 +167,15 @@ class Solution:
 
         Interpolated linearly; for an extremal by cubics with the slopes of its canonical flow.
         """
-        return self._state_and_costate(t)[..., : self.problem.model.nx]
+        if self.control_kind == "extremal":
+            return self._canonical(t)[..., : self.problem.model.nx]
+        return _interpolate(np.asarray(t, dtype=float), self.t, self.x)
 
     def costate_at(self, t: ArrayLike) -> np.ndarray:
         """Return the costate at time(s) t [s], interpolated as the state is."""
-        return self._state_and_costate(t)[..., self.problem.model.nx :]
+        if self.control_kind == "extremal":
+            return self._canonical(t)[..., self.problem.model.nx :]
+        return _interpolate(np.asarray(t, dtype=float), self.t, self.costate)
 
     def control(self, t: ArrayLike) -> np.ndarray:
         """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says.
@@ -213,11 +217,9 @@ class Solution:
             )
         return values
 
-    def _state_and_costate(self, t: ArrayLike) -> np.ndarray:
-        times = np.asarray(t, dtype=float)
-        if self.control_kind == "extremal":
-            return self._cubics(np.clip(times, self.t[0], self.t[-1]))
-        return _interpolate(times, self.t, np.hstack([self.x, self.costate]))
+    def _canonical(self, t: ArrayLike) -> np.ndarray:
+        """State and costate of an extremal."""
+        return self._cubics(np.clip(np.asarray(t, dtype=float), self.t[0], self.t[-1]))
 
     @cached_property
     def _cubics(self) -> PPoly:

@@ -13,6 +13,7 @@ from solvers import (
     IndirectShooting,
     MultipleShooting,
     Schuetz,
+    StagewiseNewton,
     polish,
     refined,
 )
@@ -84,6 +85,7 @@ def library_methods() -> tuple[Method, ...]:
     coarse, fine = (MultipleShooting(n) for n in USUAL)
     shooting, after = IndirectShooting(segments=15), "from direct-coarse"
     gradient, between = _gradient(USUAL[0]), _between(USUAL[0])
+    newton = StagewiseNewton(USUAL[0])
     fatrop, settings = _fatrop(USUAL[0]), f"polish, accuracy {ACCURACY:g}"
     return (
         method("direct-coarse", "direct", _direct_coarse, coarse, "own guess"),
@@ -95,5 +97,7 @@ def library_methods() -> tuple[Method, ...]:
         method("direct-between", "between", _on_coarse(_between), between, "margins, own guess"),
         method("indirect", "indirect", _indirect, shooting, after),
         method("extremal", "polish", _extremal, settings, "direct-coarse made extremal"),
+        # On the cases that declare steepest descent: no constraints but bounds of the controls.
+        method("newton", "gradient", _on_coarse(StagewiseNewton), newton, "own guess"),
         method("gradient", "gradient", _on_coarse(_gradient), gradient, "own guess"),
     )

@@ -75,6 +75,7 @@ TOLERANCES: dict[str, dict[Difficulty, Tolerance]] = {
     "direct-coarse": DIRECT_COARSE,
     "direct-fine": DIRECT_FINE,
     "direct-fatrop": DIRECT_COARSE,
+    "newton": DIRECT_COARSE,
     "collocation": COLLOCATION,
     "direct-between": BETWEEN,
     "indirect": INDIRECT,

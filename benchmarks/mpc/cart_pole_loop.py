@@ -15,7 +15,7 @@ import numpy as np
 
 from models import CartPole, cart_pole_upright
 from ocp import MPC, OCP, Plant, Rollout, Solution, Solver, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz
+from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
 DT, DURATION = 0.05, 4.0  # [s]
 FORCE, TRACK, CUSHION = 12.0, 0.6, 0.1  # [N], [m], [m]
@@ -30,6 +30,7 @@ _NOISE = (1e-3, 2e-3, 1e-2, 2e-2)
 SOLVERS: dict[str, Callable[[int], Solver]] = {
     "ipopt": MultipleShooting,
     "fatrop": lambda n: MultipleShooting(n, backend="fatrop"),
+    "newton": StagewiseNewton,
     "shooting": lambda n: IndirectShooting(steps=n, tolerance=1e-8),
     "shooting-5": lambda n: IndirectShooting(segments=5, steps=n, tolerance=1e-8),
     "schuetz-sound": lambda n: Schuetz.sound(intervals=n),
@@ -54,7 +55,7 @@ _SHOWN = 0.75
 
 def settings(horizons: Sequence[float] = HORIZONS) -> list[Setting]:
     """Return all loops of the suite; the slow solvers only where 0.75 s is among the horizons."""
-    fast = ("ipopt", "fatrop", "shooting-5")
+    fast = ("ipopt", "fatrop", "newton", "shooting-5")
     chosen = [Setting("nominal", solver, h) for solver in fast for h in horizons]
     if _SHOWN in horizons:
         chosen += [Setting("nominal", solver, _SHOWN) for solver in ("shooting", "schuetz-sound")]
@@ -81,7 +82,7 @@ def loop(setting: Setting, *, seed: int = 1) -> Rollout:
     Indirect solvers and descent get their first guess from the direct solution, as on the arm.
     """
     ocp, intervals = problem(setting.horizon), max(1, round(setting.horizon / DT))
-    direct = setting.solver in ("ipopt", "fatrop")
+    direct = setting.solver in ("ipopt", "fatrop", "newton")
     mpc = MPC(
         ocp=ocp,
         solver=SOLVERS[setting.solver](intervals),

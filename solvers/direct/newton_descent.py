@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp import Status
-from solvers.direct.newton_step import Iterate, NewtonStep, View
+from solvers.direct.newton_step import Iterate, NewtonStep, Step, View
 
 # Share of the promised decrease that a step must bring [Nocedal & Wright 2006].
 _ARMIJO = 1e-4
@@ -31,8 +31,8 @@ class Descent:
 
     A step is computed with the exact second derivative, and its law followed by the model itself
     (``NewtonStep.moved``): the first full step closes all gaps, and from then on the merit is the
-    cost. Where a Q_uu is not positive definite
-    the shift sigma grows until all of them are, so that the step leads downhill; where no share
+    cost. Where a Q_uu is not positive definite, or the controls at bounds are not found, the
+    shift sigma grows until all of them are, so that the step leads downhill; where no share
     of a step is accepted it grows as well. The end is judged without it: it is a minimum only
     if all Q_uu are positive definite there (the second-order condition of the discretised
     problem). From a stationary point that has negative curvature the controls are pushed away
@@ -52,14 +52,15 @@ class Descent:
 
     def __post_init__(self) -> None:
         """Nothing is known yet."""
-        self.views, self.message = 0, ""
+        self.views, self.sweeps, self.message = 0, 0, ""
         self.costs: list[float] = []
         self.residuals: list[float] = []
         self._penalty, self._kicked = 0.0, False
+        self._unshifted: Step | None = None
 
     def descend(self, start: Iterate) -> Status:
-        """Iterate from a start; ``here`` and ``view`` are the iterate and what it is worth."""
-        self._stand_at(start, self._look(start))
+        """Iterate from a start; ``view`` is where it ends and what that is worth."""
+        self._stand_at(self._look(start))
         if not self.view.is_finite:
             self.message = "cost or dynamics are not finite at the first iterate"
             return Status.DIVERGED
@@ -68,7 +69,7 @@ class Descent:
                 return self._verdict()
             if not self._advance():
                 return self._stuck()
-            if max(np.abs(self.here.x).max(), np.abs(self.here.u).max()) > _HUGE:
+            if max(np.abs(self.view.at.x).max(), np.abs(self.view.at.u).max()) > _HUGE:
                 self.message = "the cost may be unbounded below"
                 return Status.DIVERGED
         if self.view.residual <= self.tolerance:
@@ -80,44 +81,54 @@ class Descent:
 
     def _advance(self) -> bool:
         """Take a step that is accepted, with as little shift as that needs."""
-        view, sigma = self.view, 0.0
-        first = _SHIFT * (view.size or 1.0)
+        sigma, first = 0.0, _SHIFT * (self.view.size or 1.0)
         while sigma <= _MOST * first:
-            if view.is_convex and self._search(view):
+            step = self._step(sigma)
+            if step.is_convex and step.is_settled and self._search(step):
                 return True
             sigma = _GROWTH * sigma or first
-            view = self._look(self.here, sigma)
         return False
 
-    def _search(self, view: View) -> bool:
+    def _search(self, step: Step) -> bool:
         """Move by the largest share 1, 1/2, 1/4 ... of the step that is accepted."""
-        slope = view.cost_slope
+        view, slope = self.view, step.cost_slope
         # Below the largest costate the penalty is not exact; above it nothing is gained
         # [Powell 1978].
-        enough = view.next_costate
+        enough = step.next_costate
         self._penalty = max(enough, (self._penalty + enough) / 2.0)
         if view.gaps > 0.0:
-            needed = (slope + max(view.bend, 0.0) / 2.0) / ((1.0 - _GAPS) * view.gaps)
+            needed = (slope + max(step.bend, 0.0) / 2.0) / ((1.0 - _GAPS) * view.gaps)
             self._penalty = max(self._penalty, needed)
             slope -= self._penalty * view.gaps
         before = view.cost + self._penalty * view.gaps
         slack, share = _ROUNDING * (1.0 + abs(before)), 1.0
+        if slope > slack:  # curvature towards the bounds of clamped controls
+            return False
         while share >= _SHORTEST:
-            there = self.step.moved(self.here, view, share, self.schedule)
-            trial = self._look(there)
-            merit = trial.cost + self._penalty * trial.gaps
-            if trial.is_finite and merit <= before + _ARMIJO * share * slope + slack:
-                self._stand_at(there, trial)
+            there = self._look(self.step.moved(step, view, share, self.schedule))
+            merit = there.cost + self._penalty * there.gaps
+            if there.is_finite and merit <= before + _ARMIJO * share * slope + slack:
+                self._stand_at(there)
                 return True
             share /= 2.0
         return False
 
-    def _look(self, at: Iterate, sigma: float = 0.0) -> View:
-        self.views += 1
-        return self.step.view(at, sigma, self.schedule)
+    def _step(self, sigma: float = 0.0) -> Step:
+        """Return the step from here; the one without a shift is kept."""
+        if sigma == 0.0 and self._unshifted:
+            return self._unshifted
+        step = self.step.step(self.view, sigma)
+        self.sweeps += step.sweeps
+        if sigma == 0.0:
+            self._unshifted = step
+        return step
 
-    def _stand_at(self, here: Iterate, view: View) -> None:
-        self.here, self.view = here, view
+    def _look(self, at: Iterate) -> View:
+        self.views += 1
+        return self.step.view(at, self.schedule)
+
+    def _stand_at(self, view: View) -> None:
+        self.view, self._unshifted = view, None
         self.costs.append(view.cost)
         self.residuals.append(view.residual)
 
@@ -125,24 +136,24 @@ class Descent:
 
     def _leaves(self) -> bool:
         """Leave a stationary point that is no minimum, once."""
-        if self._kicked or not self.view.pivots.min() < -self.view.definite:
+        if self._kicked or not self._step().pivots.min() < -Step.definite:
             return False
-        u = self.here.u
-        push = _KICK * np.random.default_rng(0).normal(size=u.shape) * (1.0 + np.abs(u))
-        there = Iterate(self.here.x, u + push, self.here.costate)
-        view = self._look(there)
+        here = self.view.at
+        push = _KICK * np.random.default_rng(0).normal(size=here.u.shape) * (1.0 + np.abs(here.u))
+        pushed = self.step.bounds.clip((here.u + push).T).T
+        view = self._look(Iterate(here.x, pushed, here.costate))
         if not view.is_finite:
             return False
         self._kicked = True
-        self._stand_at(there, view)
+        self._stand_at(view)
         return True
 
     def _verdict(self) -> Status:
-        if self.view.is_convex:
+        if self._step().is_convex:
             return Status.SOLVED
-        pivots = self.view.pivots.min(axis=0)
+        pivots = self._step().pivots.min(axis=0)
         worst = int(np.argmin(pivots))
-        kind = "no minimum" if pivots[worst] < -self.view.definite else "perhaps no strict minimum"
+        kind = "no minimum" if pivots[worst] < -Step.definite else "perhaps no strict minimum"
         t = self.schedule[0][0, worst]
         self.message = f"{kind}: Q_uu is not positive definite at t = {t:.4g} s"
         return Status.STATIONARY

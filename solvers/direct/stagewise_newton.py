@@ -1,4 +1,4 @@
-"""Newton's method stage by stage: the quickest way to a minimum without inequalities."""
+"""Newton's method stage by stage: the quickest way to a minimum within bounds of the controls."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,12 +36,19 @@ class StagewiseNewton(Solver):
     step of the integrator each, the gaps between them closed at the end. One Newton step with
     the exact second derivative of the Lagrangian costs one evaluation of every stage and one
     recursion: effort linear in N. Where that derivative is not convex on the controls it is
-    shifted (see ``NewtonStep.view``), and steps are shortened by a line search on an exact
-    penalty function. ``SOLVED`` stands for a strict local minimum of the discretised problem:
-    the unshifted recursion has only positive definite Q_uu there.
+    shifted (see ``NewtonStep.step``), and steps are shortened by a line search on an exact
+    penalty function.
 
-    Refuses every bound and constraint, a free start and a free final time.
-    Source: [Dunn & Bertsekas 1989], [Rao, Wright & Rawlings 1998].
+    Controls at a bound are clamped inside the recursion, which is repeated, without new
+    derivatives, until the right ones are (see ``Clamped``): one to three times from a plan of
+    the step before, more from afar. No iterate is ever out of bounds, not by rounding either.
+
+    ``SOLVED`` stands for a strict local minimum of the discretised problem: the unshifted
+    recursion has only positive definite Q_uu there, among the controls that are not at a bound
+    with a multiplier.
+
+    Refuses state bounds and every constraint, a free start and a free final time.
+    Source: [Dunn & Bertsekas 1989], [Hintermueller, Ito & Kunisch 2002].
 
     Args:
         intervals: number of intervals, with one held control each; a discrete-time problem
@@ -86,9 +93,8 @@ def _refuse(ocp: OCP) -> None:
         raise UnsupportedProblem(
             f"{ocp.name}: stagewise Newton takes no {c.at} constraint ('{c.name}')"
         )
-    for what, box in (("control", ocp.control_bounds), ("state", ocp.state_bounds)):
-        if box.is_active:
-            raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no {what} bounds")
+    if ocp.state_bounds.is_active:
+        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no state bounds")
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no free final time")
 
@@ -124,7 +130,8 @@ class StagewiseNewtonProgram(Program):
         solver = self.solver
         descent = Descent(self.step, [*schedule, final], solver.tolerance, solver.max_iterations)
         status = descent.descend(self._first_iterate(data, guess or ocp.guess))
-        x, u = descent.here.x.T, descent.here.u.T
+        found = descent.view
+        x, u = found.at.x.T, found.at.u.T
         message = descent.message
         t = data.t0 + self.intervals.fractions * ocp.duration
         if status.is_success:
@@ -140,12 +147,12 @@ class StagewiseNewtonProgram(Program):
             t=t,
             x=x,
             x0=data.x0,
-            costate=descent.here.costate.T,
+            costate=found.at.costate.T,
             u=u,
-            cost=descent.view.cost if np.isfinite(descent.view.cost) else np.inf,
-            residual=descent.view.residual if descent.view.is_finite else np.inf,
+            cost=found.cost if np.isfinite(found.cost) else np.inf,
+            residual=found.residual if found.is_finite else np.inf,
             iterations=len(descent.costs) - 1,
-            work=Work(*[descent.views] * 3),
+            work=Work(descent.views, descent.views, descent.sweeps),
             history={
                 "cost": np.array(descent.costs),
                 "residual": np.array(descent.residuals),
