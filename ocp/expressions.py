@@ -79,6 +79,14 @@ def whole(value: object, what: str, *, least: int = 1) -> int:
     return int(value)
 
 
+def positive(value: object, what: str) -> float:
+    """Return ``value`` if it is one positive, finite number, or raise ``ProblemError``."""
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if not number or isinstance(value, bool) or not 0.0 < value < np.inf:
+        raise ProblemError(f"{what} = {value!r}, it must be a positive, finite number")
+    return float(value)
+
+
 def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
     """Raise ``ProblemError`` unless ``value`` is of a kind."""
     if not isinstance(value, kind):

@@ -1,6 +1,6 @@
 """The boundary value problem of the minimum principle on segments, with exact derivatives."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -129,6 +129,7 @@ class Extremals:
         slopes: the same -> derivative of each step in z and in T.
         ends: (z, nu, t, p) -> end conditions, derivatives in z, nu, t.
         starts: (z, mu, t, p) -> start conditions, derivatives in z, mu.
+        one: what ``roll`` and ``slopes`` do in each step.
     """
 
     ocp: OCP
@@ -139,6 +140,7 @@ class Extremals:
     slopes: Buffered
     ends: ca.Function
     starts: ca.Function
+    one: tuple[ca.Function, ca.Function]
 
     @classmethod
     def of(
@@ -155,7 +157,13 @@ class Extremals:
             step, slope = compiled(step), compiled(slope)
         roll = Buffered(step.mapaccum(steps).map(segments))
         slopes = Buffered(slope.map(segments * steps))
-        return cls(ocp, optimality, shape, steps, roll, slopes, ends, starts)
+        return cls(ocp, optimality, shape, steps, roll, slopes, ends, starts, (step, slope))
+
+    def finer(self) -> "Extremals":
+        """Return the same with half the step; nothing is derived again."""
+        (step, slope), steps, segments = self.one, 2 * self.steps, self.shape.segments
+        roll = Buffered(step.mapaccum(steps).map(segments))
+        return replace(self, steps=steps, roll=roll, slopes=Buffered(slope.map(segments * steps)))
 
     # -- the boundary value problem --------------------------------------------------------
 
