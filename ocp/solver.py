@@ -8,6 +8,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.expressions import instance
 from ocp.problem import OCP
 from ocp.solution import Solution
 
@@ -73,7 +74,15 @@ class Solver(ABC):
 
 
 def solve(ocp: OCP, solver: Solver, *, guess: Start | None = None) -> Solution:
-    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed."""
+    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
+
+    Raises:
+        ProblemError: if an argument is of another kind, or the guess does not fit.
+        UnsupportedProblem: naming the term that the solver cannot treat.
+    """
+    instance(ocp, OCP, "solve: ocp")
+    instance(solver, Solver, "solve: solver")
+    ocp.first_guess(guess)
     start = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - start

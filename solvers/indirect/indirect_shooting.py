@@ -24,6 +24,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     instance,
+    positive,
     whole,
 )
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation
@@ -75,10 +76,12 @@ class IndirectShooting(Solver):
         whole(self.segments, "indirect shooting: segments")
         whole(self.steps, "indirect shooting: steps", least=self.segments)
         instance(self.integrator, Integrator, "indirect shooting: integrator")
-        if self.max_steps < 1 or not (self.tolerance > 0.0 and self.delta > 0.0):
-            raise ProblemError(
-                "indirect shooting needs at least one Newton step, positive tolerance and delta"
-            )
+        whole(self.max_steps, "indirect shooting: max_steps")
+        positive(self.tolerance, "indirect shooting: tolerance")
+        positive(self.delta, "indirect shooting: delta")
+        if self.continuation is not None:
+            kinds = (HorizonContinuation, ParameterContinuation)
+            instance(self.continuation, kinds, "indirect shooting: continuation")
         if self.jacobian not in ("exact", "finite-difference"):
             raise ProblemError(
                 f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
