@@ -7,7 +7,7 @@ from ocp.constraint import Box, Constraint
 from ocp.curvature import curvature
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
-from ocp.expressions import instance, numbers, whole
+from ocp.expressions import instance, numbers, positive, whole
 from ocp.functions import Functions
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
@@ -112,6 +112,7 @@ __all__ = [
     "linear_quadratic",
     "most_violated",
     "numbers",
+    "positive",
     "records",
     "replay",
     "replay_all",

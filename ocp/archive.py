@@ -9,6 +9,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ocp.errors import ProblemError
+from ocp.expressions import instance
 
 
 def write_archive(path: str | Path, content: Mapping[str, Any]) -> Path:
@@ -25,9 +26,12 @@ def read_archive(path: str | Path, what: str, needed: Collection[str]) -> dict[s
     Raises:
         ProblemError: if it cannot be read or lacks a name; ``what`` is what it should have been.
     """
+    instance(path, (str, Path), f"the path of a saved {what}")
     try:
         with Path(path).open("rb") as raw, np.load(raw) as file:
             data = {name: file[name] for name in file.files}
+    except OSError as error:
+        raise ProblemError(f"the saved {what} {path} cannot be read: {error.strerror}") from error
     except (ValueError, TypeError, EOFError, BadZipFile, zlib.error) as error:
         raise ProblemError(f"{path} is no saved {what}: {error}") from error
     missing = set(needed) - set(data)

@@ -5,6 +5,8 @@ from functools import wraps
 from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakKeyDictionary
 
+from ocp.expressions import instance
+
 if TYPE_CHECKING:
     from ocp.problem import OCP
 
@@ -18,6 +20,9 @@ def once_per_problem(derive: "Callable[[OCP], T]") -> "Callable[[OCP], T]":
     @wraps(derive)
     def derived(ocp: "OCP") -> T:
         if ocp not in kept:
+            from ocp.problem import OCP  # which is built on this
+
+            instance(ocp, OCP, f"{derive.__name__.lstrip('_')}: the problem")
             kept[ocp] = derive(ocp)
         return kept[ocp]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
-from ocp.expressions import column, numbers
+from ocp.expressions import column, instance, numbers
 
 Place = Literal["path", "initial", "terminal"]
 
@@ -75,6 +75,7 @@ class Constraint:
 
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
+        instance(self.name, str, "the name of a constraint")
         if self.at not in ("path", "initial", "terminal"):
             raise ProblemError(f"constraint '{self.name}': at = {self.at!r} is no place")
         expression = column(self.expression, f"constraint '{self.name}'")

@@ -26,9 +26,10 @@ class Data:
     values: ParameterValues
 
     def __post_init__(self) -> None:
-        """Refuse an initial time that is not finite."""
-        if not np.isfinite(self.t0):
-            raise ProblemError(f"t0 = {self.t0}, a finite time is needed")
+        """Refuse an initial time that is no finite number."""
+        number = isinstance(self.t0, (float, int, np.integer, np.floating))
+        if not number or not np.isfinite(self.t0):
+            raise ProblemError(f"t0 = {self.t0!r}, a finite time is needed")
 
     @classmethod
     def of(

@@ -88,6 +88,21 @@ def whole(value: object, what: str, *, least: int = 1) -> int:
     return int(value)
 
 
+def positive(value: object, what: str, *, finite: bool = True) -> float:
+    """Return ``value`` if it is one positive number, or raise ``ProblemError``.
+
+    Args:
+        value: what should be a number.
+        what: how a message calls it.
+        finite: whether infinity is refused.
+    """
+    number = isinstance(value, int | float | np.integer | np.floating)
+    as_float = float(value) if number and not isinstance(value, bool) else np.nan
+    if not (as_float > 0.0 and (as_float < np.inf or not finite)):
+        raise ProblemError(f"{what} = {value!r}, it must be positive{', finite' * finite}")
+    return as_float
+
+
 def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
     """Check that ``value`` is of a kind.
 
@@ -102,7 +117,18 @@ def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(k.__name__ for k in kinds)
-        raise ProblemError(f"{what} is a {type(value).__name__}, {names} is needed")
+        raise ProblemError(f"{what} is {_named(value)}, {names} is needed{_hint(value, kind)}")
+
+
+def _named(value: object) -> str:
+    return f"the class {value.__name__}" if isinstance(value, type) else f"a {type(value).__name__}"
+
+
+def _hint(value: object, kind: type | tuple[type, ...]) -> str:
+    """Return what was probably meant: an instance of a class, the solution inside a result."""
+    if isinstance(value, type):
+        return f": write {value.__name__}(...)" if issubclass(value, kind) else ""
+    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kind) else ""
 
 
 def numbers(

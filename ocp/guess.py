@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
-from ocp.expressions import numeric
+from ocp.expressions import numeric, positive
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,8 +30,8 @@ class Guess:
 
     def __post_init__(self) -> None:
         """Check the duration; the shapes are checked where they are known."""
-        if self.duration is not None and not 0.0 < self.duration < np.inf:
-            raise ProblemError(f"guess: duration = {self.duration}, it must be positive, finite")
+        if self.duration is not None:
+            positive(self.duration, "guess: duration")
 
     def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
         """Return one part at fractions of the horizon, (len(fractions), width), or None.

@@ -6,7 +6,14 @@ from functools import cached_property
 import casadi as ca
 
 from ocp.errors import ProblemError
-from ocp.expressions import column, element_names, refuse_foreign_symbols, require_symbols
+from ocp.expressions import (
+    column,
+    element_names,
+    instance,
+    positive,
+    refuse_foreign_symbols,
+    require_symbols,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,6 +50,7 @@ class Model:
 
     def __post_init__(self) -> None:
         """Check every shape and symbol."""
+        instance(self.name, str, "the name of a model")
         for label in ("x", "u", "t"):
             require_symbols(getattr(self, label), f"model '{self.name}': {label}")
         if self.t.numel() != 1:
@@ -55,11 +63,10 @@ class Model:
                 f"model '{self.name}': f has {f.numel()} rows, but there are {self.nx} states x"
             )
         object.__setattr__(self, "f", f)
-        if self.dt is not None and not (0.0 < self.dt < float("inf")):
-            raise ProblemError(
-                f"model '{self.name}': dt = {self.dt} s, it must be positive, finite"
-            )
+        if self.dt is not None:
+            positive(self.dt, f"model '{self.name}': dt")
         for label, units, size in (("x", self.x_units, self.nx), ("u", self.u_units, self.nu)):
+            instance(units, (tuple, list), f"model '{self.name}': {label}_units")
             if units and len(units) != size:
                 raise ProblemError(
                     f"model '{self.name}': {label}_units has {len(units)} entries "

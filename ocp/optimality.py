@@ -7,10 +7,11 @@ import casadi as ca
 import numpy as np
 
 from ocp.cache import once_per_problem
-from ocp.constraint import Box, Constraint
+from ocp.constraint import Constraint
 from ocp.errors import UnsupportedProblem
 from ocp.functions import stacked
 from ocp.hamiltonian import Hamiltonian, hamiltonian
+from ocp.minimiser import minimising_control
 from ocp.parameters import Signal
 
 if TYPE_CHECKING:
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
 
 # H_uu with a smaller reciprocal condition number does not determine the control.
 _SINGULAR = 1e-10
-
-
-_LAW_INPUTS = ["x", "costate", "t", "p"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,7 @@ def derive(ocp: "OCP") -> Optimality:
         )
     h = hamiltonian(ocp)
     _require_regular(ocp, h)
-    control = _minimising_control(ocp, h)
+    control = minimising_control(ocp, h)
     return Optimality(
         hamiltonian=h,
         control=control,
@@ -118,42 +116,6 @@ def _probed_curvatures(ocp: "OCP", h: Hamiltonian) -> list[np.ndarray]:
     controls = [np.zeros(m.nu), *rng.normal(size=(5, m.nu))]
     probes = zip(costates, ocp.control_bounds.clip(np.array(controls)), strict=True)
     return [np.array(h.control_curvature(ocp.start(), u, c, 0.0, p)) for c, u in probes]
-
-
-def _minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
-    """Closed form where H is quadratic in u, saturated at the bounds; else an implicit root."""
-    m, p, e = ocp.model, ocp.p, h.expressions
-    box = ocp.control_bounds
-    diagonal = e.curvature.sparsity().is_diag()
-    if ca.depends_on(e.curvature, m.u) or (box.is_active and not diagonal):
-        return _implicit_control(ocp, h)
-    at_zero = ca.substitute(e.gradient, m.u, ca.DM.zeros(m.nu))
-    free = -at_zero / ca.diag(e.curvature) if diagonal else -ca.solve(e.curvature, at_zero)
-    bounded = _clip(free, box) if box.is_active else free
-    return ca.Function("control", [m.x, e.costate, m.t, p], [bounded], _LAW_INPUTS, ["u"])
-
-
-def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
-    """Root in u of the natural residual u - clip(u - H_u), by Newton from the point nearest 0."""
-    m, box = ocp.model, ocp.control_bounds
-    u = ca.MX.sym("u", m.nu)
-    sizes = (m.nx, m.nx, 1, ocp.p.numel())
-    inputs = [ca.MX.sym(name, size) for name, size in zip(_LAW_INPUTS, sizes, strict=True)]
-    x, costate, t, p = inputs
-    slope = h.control_gradient(x, u, costate, t, p)
-    residual = u - _clip(u - slope, box) if box.is_active else slope
-    options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50}
-    options |= {"error_on_fail": False, "show_eval_warnings": False}
-    given = ca.vertcat(*inputs)
-    root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
-    guess = box.clip(np.zeros(m.nu))
-    found = root(guess, given)
-    bounded = _clip(found, box) if box.is_active else found  # the root is, up to rounding
-    return ca.Function("control", inputs, [bounded], _LAW_INPUTS, ["u"])
-
-
-def _clip(value: Any, box: Box) -> Any:
-    return ca.fmin(ca.fmax(value, ca.DM(np.asarray(box.lower))), ca.DM(np.asarray(box.upper)))
 
 
 def _flow(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:

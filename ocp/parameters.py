@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError
-from ocp.expressions import numbers, numeric, require_symbols
+from ocp.expressions import instance, numbers, numeric, require_symbols
 
 # Two grids whose nodes differ by rounding must be taken as the same grid.
 _SAME_NODE = 1e-9
@@ -133,6 +133,8 @@ class ParameterValues:
         cls, entries: Sequence[Parameter | Signal], given: Mapping[str, ArrayLike] | None
     ) -> "ParameterValues":
         """Return the declared values, replaced by those ``given`` by name, all checked."""
+        if given is not None:
+            instance(given, Mapping, "parameters (values by name)")
         given = dict(given or {})
         values = tuple(np.asarray(e.checked(given.pop(e.name, e.value))) for e in entries)
         if given:

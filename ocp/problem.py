@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -16,6 +16,7 @@ from ocp.expressions import (
     element_names,
     instance,
     numbers,
+    positive,
     refuse_foreign_symbols,
     scalar,
 )
@@ -43,8 +44,11 @@ class FreeTime:
     upper: float = np.inf
 
     def __post_init__(self) -> None:
-        """Check the order of the three durations."""
-        if not 0.0 < self.lower <= self.guess <= self.upper:
+        """Check the three durations and their order."""
+        positive(self.guess, "free final time: guess")
+        positive(self.lower, "free final time: lower")
+        positive(self.upper, "free final time: upper", finite=False)
+        if not self.lower <= self.guess <= self.upper:
             raise ProblemError(
                 f"free final time: 0 < lower <= guess <= upper is needed, "
                 f"not {self.lower}, {self.guess}, {self.upper} [s]"
@@ -190,6 +194,21 @@ class OCP:
         """
         return numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
 
+    def first_guess(self, given: Any = None) -> Any:
+        """Return where a run starts, checked: what is given, else the problem's guess, or None.
+
+        Raises:
+            ProblemError: if it is nothing that can be sampled.
+        """
+        guess = self.guess if given is None else given
+        # A class has the method as well, but nothing to call it with.
+        if guess is not None and (isinstance(guess, type) or not hasattr(guess, "sample")):
+            raise ProblemError(
+                f"{self.name}: the guess is {guess if isinstance(guess, type) else type(guess)}, "
+                "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
+            )
+        return guess
+
     def describe(self) -> str:
         """Return the problem in mathematics, for a person."""
         return describe(self)
@@ -197,11 +216,11 @@ class OCP:
     # -- checks at construction -----------------------------------------------------
 
     def _check_kinds(self) -> None:
+        instance(self.name, str, "the name of a problem")
         instance(self.model, Model, f"{self.name}: model")
         instance(self.control_bounds, Box, f"{self.name}: control_bounds")
         instance(self.state_bounds, Box, f"{self.name}: state_bounds")
-        if self.guess is not None and not hasattr(self.guess, "sample"):
-            instance(self.guess, Guess, f"{self.name}: guess")
+        self.first_guess()
         for what, kind in (
             ("constraints", Constraint),
             ("invariants", Constraint),
@@ -224,14 +243,14 @@ class OCP:
                 raise ProblemError(f"{self.name}: two {kind}s are called '{twice[0]}'")
 
     def _check_horizon(self) -> None:
-        if self.smoothness not in (0, 1, 2):
+        if not isinstance(self.smoothness, int) or self.smoothness not in (0, 1, 2):
             raise ProblemError(f"{self.name}: smoothness = {self.smoothness!r}, it is 0, 1 or 2")
         if isinstance(self.horizon, FreeTime):
             if self.model.is_discrete:
                 raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
             return
         number = isinstance(self.horizon, int | float | np.integer | np.floating)
-        if not number or not 0.0 < self.horizon < np.inf:
+        if not number or isinstance(self.horizon, bool) or not 0.0 < self.horizon < np.inf:
             raise ProblemError(
                 f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite"
             )

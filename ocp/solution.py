@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +13,10 @@ from scipy.interpolate import PPoly
 from ocp.archive import read_archive, write_archive
 from ocp.data import Data
 from ocp.errors import ProblemError, SolverError
+from ocp.expressions import instance
 from ocp.optimality import derive
 from ocp.pieces import Pieces
+from ocp.probe import differing, probe
 from ocp.problem import OCP
 from ocp.status import Status
 
@@ -95,7 +97,14 @@ class Solution:
     solve_time: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check shapes, and that no number is NaN."""
+        """Check kinds and shapes, and that no number is NaN."""
+        instance(self.problem, OCP, "solution: problem")
+        instance(self.status, Status, "solution: status")
+        if self.control_kind not in get_args(ControlKind):
+            known = ", ".join(get_args(ControlKind))
+            raise ProblemError(f"solution: control_kind = {self.control_kind!r} is none of {known}")
+        for name in _ARRAYS:
+            instance(getattr(self, name), np.ndarray, f"solution: {name}")
         n, m = len(self.t), self.problem.model
         object.__setattr__(self, "breaks", np.asarray(self.breaks, dtype=int))
         rows = n - 1 if self.control_kind == "held" else n
@@ -116,6 +125,7 @@ class Solution:
         if n < 2 or not (np.diff(self.t) > 0.0).all():
             raise ProblemError("solution: t does not increase from node to node")
         for name in ("cost", "residual"):
+            instance(getattr(self, name), (float, int, np.floating), f"solution: {name}")
             if np.isnan(getattr(self, name)):
                 raise ProblemError(f"solution: {name} is NaN")
 
@@ -243,7 +253,7 @@ class Solution:
         return plot_solution(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything but the problem to one ``.npz`` file and return its path."""
+        """Write everything to one ``.npz`` file, the problem as its ``probe``; return its path."""
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             f"{group}/{key}": value
@@ -253,6 +263,7 @@ class Solution:
         content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
         content |= {"status": self.status.name, "problem": self.problem.name}
         content |= {"breaks": self.breaks}
+        content |= {f"probe/{part}": values for part, values in probe(self.problem).items()}
         return write_archive(path, content)
 
     @classmethod
@@ -260,18 +271,24 @@ class Solution:
         """Read a solution of ``problem`` from a file that ``save`` wrote.
 
         Raises:
-            ProblemError: if the file belongs to another problem or is no solution.
+            ProblemError: if the file belongs to another problem, by its name or by what the
+                problem's functions and bounds are (older files know only the name), or
+                is no solution.
         """
+        instance(problem, OCP, f"the problem that {path} is to be a solution of")
         needed = {"status", "problem", *_ARRAYS, *_SCALARS}
         data = read_archive(path, "solution", needed)
         data.setdefault("breaks", np.empty(0, dtype=int))  # files of before there were any
         if str(data["problem"]) != problem.name:
             raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
-        groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}}
+        groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}, "probe": {}}
         for name, value in data.items():
             group, _, key = name.partition("/")
             if key:
                 groups[group][key] = value
+        other = differing(groups["probe"], probe(problem)) if groups["probe"] else ()
+        if other:
+            raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
         if str(data["status"]) not in Status.__members__:
             raise ProblemError(f"{path} is no saved solution: its status is '{data['status']}'")
         return cls(

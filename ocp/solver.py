@@ -8,6 +8,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.expressions import instance
 from ocp.problem import OCP
 from ocp.solution import Solution
 
@@ -85,8 +86,11 @@ def solve(ocp: OCP, solver: Solver, *, guess: Start | None = None) -> Solution:
 
     Raises:
         UnsupportedProblem: where the method cannot treat the problem, naming the term.
-        ProblemError: for a guess of the wrong shape.
+        ProblemError: if an argument is of another kind, or the guess does not fit.
     """
+    instance(ocp, OCP, "solve: ocp")
+    instance(solver, Solver, "solve: solver")
+    ocp.first_guess(guess)
     start = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - start

@@ -9,6 +9,7 @@ import numpy as np
 from ocp.assembled import assembled
 from ocp.compile import compiled
 from ocp.data import Data
+from ocp.expressions import instance
 from ocp.functions import stacked
 from ocp.integrate import Integrator, Stage
 from ocp.problem import OCP
@@ -37,6 +38,10 @@ class Transcription:
     intervals: int
     integrator: Integrator
     compiled: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no problem; the numbers are checked by the solvers."""
+        instance(self.ocp, OCP, "the problem to transcribe")
 
     # -- layout -----------------------------------------------------------------------
 

@@ -5,7 +5,17 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
+from ocp import (
+    OCP,
+    Guess,
+    ProblemError,
+    Solution,
+    Solver,
+    evaluate,
+    instance,
+    positive,
+    whole,
+)
 from solvers.indirect.indirect_shooting import IndirectShooting
 
 # Two answers whose true costs and states agree to this, relative, are the same optimum.
@@ -57,10 +67,13 @@ def multistart(
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
     """
+    instance(ocp, OCP, "multistart: ocp")
+    instance(solver, Solver, "multistart: solver")
+    whole(starts, "multistart: starts")
+    whole(seed, "multistart: seed", least=0)
+    positive(amplitude, "multistart: amplitude")
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
-    if starts < 1:
-        raise ProblemError(f"multistart needs at least one start, not {starts}")
     started = perf_counter()
     program = solver.build(ocp)
     build_time = perf_counter() - started

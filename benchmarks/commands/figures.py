@@ -29,7 +29,7 @@ def _run(options: Namespace, console: Console) -> int:
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task("figures", total=len(wanted))
         for figure, drawing in draw_all(wanted, options.out):
-            files = f"  {options.out / figure.stem}.png, .csv"
+            files = f"  {options.out / figure.stem}.png, .csv{', .gif' if drawing.film else ''}"
             for line in (drawing.sentence, files):
                 bar.console.print(line, highlight=False, soft_wrap=True)
             bar.advance(task)

@@ -1,5 +1,6 @@
 """Options that several commands have, and names that a user types."""
 
+import sys
 from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Sequence
 from math import inf
@@ -59,7 +60,7 @@ def named(
     """Return what is called by name, everything where no name is given.
 
     Raises:
-        SystemExit: with a sentence, if there is no such name.
+        SystemExit: with 2, as for any wrong argument, after a sentence; if there is no such name.
     """
     if not names:
         return list(available)
@@ -69,8 +70,8 @@ def named(
         if not found and by_beginning:
             found = [entry for entry in available if entry.name.startswith(name)]
         if not found:
-            raise SystemExit(
-                f"no {what} is called '{name}'; `python -m benchmarks list` names them"
-            )
+            said = f"no {what} is called '{name}'; `python -m benchmarks list` names them"
+            print(said, file=sys.stderr)
+            raise SystemExit(2)
         chosen += [entry for entry in found if entry not in chosen]
     return chosen

@@ -84,5 +84,11 @@ def summary_table(verdicts: Sequence[Verdict]) -> Table:
         wrong = [v for v in group if isinstance(v.entry, Mistake)]
         sound = [v for v in group if isinstance(v.entry, Sound)]
         alarms = sum(not v.is_right for v in sound)
-        table.add_row(name, str(len(wrong)), f"{share(wrong):.0%}", str(len(sound)), str(alarms))
+        table.add_row(
+            name,
+            str(len(wrong)),
+            f"{share(wrong):.0%}" if wrong else "-",
+            str(len(sound)),
+            str(alarms),
+        )
     return table

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ocp.errors import ProblemError, UnsupportedProblem
+from ocp.expressions import instance
 from ocp.linear.structure import Terms, read_terms
 from ocp.model import Model
 from ocp.parameters import Parameter, Signal
@@ -38,6 +39,7 @@ def discretise(ocp: OCP, dt: float) -> OCP:
         UnsupportedProblem: naming the term that is not linear or quadratic, or changes with time.
         ProblemError: if dt does not fit the horizon or a signal.
     """
+    instance(ocp, OCP, "discretise: the problem")
     if ocp.model.is_discrete:
         raise ProblemError(f"{ocp.name}: the model is discrete already")
     if ocp.has_free_time:

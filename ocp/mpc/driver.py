@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance
+from ocp.expressions import instance, positive
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE, Rule
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
@@ -115,8 +115,7 @@ class MPC:
             raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
         if self.ocp.has_free_start:
             raise UnsupportedProblem(f"MPC of {name}: its start is free, here it is measured")
-        if not 0.0 < dt < np.inf:
-            raise ProblemError(f"MPC of {name}: dt = {dt} s, it must be positive, finite")
+        positive(dt, f"MPC of {name}: dt [s]")
         if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
             raise ProblemError(f"MPC of {name}: dt = {dt} s, but the model's step is {model.dt} s")
         if dt > self.ocp.duration * (1.0 + 1e-9):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ocp.expressions import instance, positive
 from ocp.referee.stationarity import final_costate, stationarity
 from ocp.referee.truth import Truth, adjoint, follow
 from ocp.referee.violation import drift, violations
@@ -48,7 +49,12 @@ def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
 
     Returns:
         the verdict; nothing is raised for a bad trajectory, its numbers are bad.
+
+    Raises:
+        ProblemError: if it is no solution, or the tolerance not positive.
     """
+    instance(solution, Solution, "evaluate: solution")
+    positive(tolerance, "evaluate: tolerance")
     truth = follow(solution, tolerance=tolerance)
     if not truth.is_finite:
         return Evaluation(
@@ -85,6 +91,7 @@ def costates_along(solution: Solution) -> Solution:
     Args:
         solution: of any method; returned as it is where its controls make the state blow up.
     """
+    instance(solution, Solution, "costates_along: solution")
     truth = follow(solution)
     if not truth.is_finite:
         return solution

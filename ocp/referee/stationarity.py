@@ -87,7 +87,10 @@ def _averaged(
                 np.add.at(weight, node, share * steps / 2)
     if solution.problem.model.is_discrete:
         weight[:] = 1.0
-    return u, gradient / weight[:, None]
+    # A node so close to the next that no step of the truth lies between has no support.
+    supported = weight > 0.0
+    gradient[supported] /= weight[supported, None]
+    return u, gradient
 
 
 def _by_coefficient(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp.cache import once_per_problem
 from ocp.integrate import RK4, Stage, interpolate
-from ocp.optimality import derive, symbol_kind
+from ocp.optimality import Optimality, derive, symbol_kind
 from ocp.problem import OCP
 from ocp.referee.march import March
 from ocp.solution import Solution
@@ -235,18 +235,24 @@ def _extremal_machine(ocp: OCP) -> _Machine:
     p0, p1, costate = kind.sym("p0", n_p), kind.sym("p1", n_p), kind.sym("costate", nx)
     begin = kind.sym("begin", 2 * nx)
 
+    law = _control_of_time(optimality)
+
     def rate(y: Any, s: Any) -> Any:  # SX or MX, as the control is closed or implicit
         """d(x, cost, z)/ds; the control is that of z, not of x."""
-        inner, at, p = y[nx + 1 :], t + s * h, interpolate(p0, p1, s)
-        u = optimality.control(inner[:nx], inner[nx:], at, p)
+        at, p = t + s * h, interpolate(p0, p1, s)
+        u, flow = law(y[nx + 1 :], at, p)
         plant = (functions.rate(y[:nx], u, at, p), functions.running_cost(y[:nx], u, at, p))
-        return h * ca.vertcat(*plant, optimality.flow(inner, at, p))
+        return h * ca.vertcat(*plant, flow)
 
     end = RK4()(rate, ca.vertcat(x, 0, begin), 0.0, 1.0)
     x_next, cost, z_next = end[:nx], end[nx], end[nx + 1 :]
     u_start = optimality.control(begin[:nx], begin[nx:], t, p0)
     u_end = optimality.control(z_next[:nx], z_next[nx:], t + h, p1)
     core_inputs = [x, begin, t, h, p0, p1]
+    zero, total = kind.zeros(ocp.model.nu), cost + ca.dot(costate, x_next)
+    adjoint_step = ca.Function(
+        "adjoint", [costate, *core_inputs], [ca.gradient(total, x), zero, zero]
+    )
     core = ca.Function("core", core_inputs, [x_next, z_next, cost, u_start, u_end])
     chosen = ca.if_else(restart > 0.5, z_node, z)
     x_next, z_next, cost, u_start, u_end = core(x, chosen, t, h, p0, p1)
@@ -255,9 +261,19 @@ def _extremal_machine(ocp: OCP) -> _Machine:
         [x, z, restart, z_node, t, h, p0, p1],
         [x_next, z_next, cost, chosen, u_start, u_end],
     )
-    total = core(*core_inputs)[2] + ca.dot(costate, core(*core_inputs)[0])
-    zero = kind.zeros(ocp.model.nu)
-    adjoint_step = ca.Function(
-        "adjoint", [costate, *core_inputs], [ca.gradient(total, x), zero, zero]
-    )
     return _Machine(step=March(step, carried=2), adjoint=March(adjoint_step))
+
+
+def _control_of_time(optimality: Optimality) -> ca.Function:
+    """(z, t, p) -> the minimising control and dz/dt, through which no derivative passes.
+
+    What is applied is a function of time; and where the control is an implicit root that was
+    not found, its derivative does not exist.
+    """
+    flow = optimality.flow
+    z, t, p = inputs = [
+        symbol_kind(flow).sym(flow.name_in(i), flow.sparsity_in(i)) for i in range(3)
+    ]
+    nx = z.numel() // 2
+    outputs = [optimality.control(z[:nx], z[nx:], t, p), flow(*inputs)]
+    return ca.Function("law", inputs, outputs, {"is_diff_in": [False] * 3})

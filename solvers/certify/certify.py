@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ocp import Solution, Status, UnsupportedProblem, whole
+from ocp import Solution, Status, UnsupportedProblem, instance, whole
 from solvers.certify.certificate import AGREEMENT, Certificate, Check, Estimate, Verdict, agreement
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
@@ -82,6 +82,8 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         UnsupportedProblem: if direct multiple shooting solves the problem on no grid.
     """
     effort = effort or Effort()
+    instance(solution, Solution, "certify: solution")
+    instance(effort, Effort, "certify: effort")
     try:
         coarse = on_grid(solution, effort.intervals)
     except NoEstimateError as reason:

@@ -131,7 +131,7 @@ class CollocationProgram(Program):
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started, ocp = perf_counter(), self.transcription.ocp
         data = Data.of(ocp, x0, t0, parameters)
-        first = self._first_iterate(data, guess or ocp.guess)
+        first = self._first_iterate(data, ocp.first_guess(guess))
         found = self.search.solve(first.joined(), data)
         return self._solution(data, found, perf_counter() - started)
 

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import ProblemError, Solution, Status, Work, whole
+from ocp import Solution, Status, Work, instance, positive, whole
 from solvers.collocation.collocation import Collocation
 from solvers.collocation.mesh import Mesh
 from solvers.collocation.points import HIGHEST, LOWEST
@@ -92,9 +92,10 @@ def refined(
         UnsupportedProblem: for a discrete-time model.
     """
     whole(rounds, "refined: rounds")
-    if not accuracy > 0.0:
-        raise ProblemError(f"refined: accuracy = {accuracy}, it must be positive")
+    positive(accuracy, "refined: accuracy")
+    instance(start, Solution, "refined: start")
     solver = solver or Collocation(intervals=10)
+    instance(solver, Collocation, "refined: solver")
     cells = _Cells.of(solver.chosen_mesh)
     solution, done, made, work, iterations = start, [], 0.0, Work(), 0
     solve_time = 0.0

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, Transcription, UnsupportedProblem, Work, whole
+from ocp import ProblemError, Transcription, UnsupportedProblem, Work, positive, whole
 from solvers.direct.transcribed import Transcribed
 
 
@@ -33,8 +33,7 @@ class Backend:
         if self.name not in ("ipopt", "fatrop"):
             raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
         whole(self.max_iterations, "a backend's max_iterations")
-        if not self.tolerance > 0.0:
-            raise ProblemError("a backend needs a positive tolerance")
+        positive(self.tolerance, "a backend's tolerance")
 
     def build(self, transcription: Transcribed) -> "Nlp":
         """Set the backend up for a transcribed problem.

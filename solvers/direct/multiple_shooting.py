@@ -14,13 +14,13 @@ from ocp import (
     RK4,
     Data,
     Integrator,
-    ProblemError,
     Program,
     Solution,
     Solver,
     Start,
     Transcription,
     instance,
+    positive,
     whole,
 )
 from solvers.direct.backend import Answer, Backend
@@ -64,8 +64,7 @@ class MultipleShooting(Solver):
         """Check the options."""
         whole(self.intervals, "multiple shooting: intervals")
         instance(self.integrator, Integrator, "multiple shooting: integrator")
-        if not self.accuracy > 0.0:
-            raise ProblemError(f"the accuracy must be positive, not {self.accuracy}")
+        positive(self.accuracy, "multiple shooting: accuracy", finite=False)
         self.options  # noqa: B018 - checks its own
 
     @property
@@ -108,7 +107,7 @@ class MultipleShootingProgram(Program):
         started = perf_counter()
         ocp = self.transcription.ocp
         data = Data.of(ocp, x0, t0, parameters)
-        z, u = self.first_iterate(data, guess or ocp.guess)
+        z, u = self.first_iterate(data, ocp.first_guess(guess))
         found = self.search.solve(self.transcription.join(z, u), data)
         return self._solution(data, found, perf_counter() - started)
 

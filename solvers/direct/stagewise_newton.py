@@ -12,7 +12,6 @@ from ocp import (
     RK4,
     Data,
     Integrator,
-    ProblemError,
     Program,
     Solution,
     Solver,
@@ -21,6 +20,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     instance,
+    positive,
     whole,
 )
 from solvers.direct.intervals import Intervals
@@ -76,8 +76,7 @@ class StagewiseNewton(Solver):
         whole(self.max_iterations, "stagewise Newton: max_iterations")
         instance(self.integrator, Integrator, "stagewise Newton: integrator")
         for name in ("tolerance", "accuracy"):
-            if not getattr(self, name) > 0.0:
-                raise ProblemError(f"stagewise Newton: {name} must be positive")
+            positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
 
     def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
@@ -129,7 +128,7 @@ class StagewiseNewtonProgram(Program):
         final = data.values.at(1.0)[0]
         solver = self.solver
         descent = Descent(self.step, [*schedule, final], solver.tolerance, solver.max_iterations)
-        status = descent.descend(self._first_iterate(data, guess or ocp.guess))
+        status = descent.descend(self._first_iterate(data, ocp.first_guess(guess)))
         found = descent.view
         x, u = found.at.x.T, found.at.u.T
         message = descent.message

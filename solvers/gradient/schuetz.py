@@ -133,7 +133,7 @@ class SchuetzProgram(Program):
         started = perf_counter()
         ocp = self.sweeps.ocp
         data = Data.of(ocp, x0, t0, parameters)
-        objective, start = Objective(self.sweeps, data), guess or ocp.guess
+        objective, start = Objective(self.sweeps, data), ocp.first_guess(guess)
         u = start.sample("u", objective.nodes[:-1], ocp.model.nu) if start else None
         descent = _Descent(
             self.solver, objective, np.zeros((self.sweeps.n, ocp.model.nu)) if u is None else u

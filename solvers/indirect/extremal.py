@@ -1,7 +1,8 @@
 """The boundary value problem of the minimum principle on segments, with exact derivatives."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from scipy import sparse
 
@@ -24,6 +25,7 @@ class Extremals:
         slopes: the same -> derivative of each step in z and in T.
         ends: (z, nu, t, p) -> end conditions, derivatives in z, nu, t.
         starts: (z, mu, t, p) -> start conditions, derivatives in z, mu.
+        one: a step and its slope, of which ``roll`` and ``slopes`` are made.
     """
 
     ocp: OCP
@@ -34,6 +36,7 @@ class Extremals:
     slopes: Buffered
     ends: Buffered
     starts: Buffered
+    one: tuple[ca.Function, ca.Function]
 
     @classmethod
     def of(
@@ -50,7 +53,23 @@ class Extremals:
             step, slope = compiled(step), compiled(slope)
         roll = Buffered(step.mapaccum(steps).map(segments))
         slopes = Buffered(slope.map(segments * steps))
-        return cls(ocp, optimality, shape, steps, roll, slopes, Buffered(ends), Buffered(starts))
+        return cls(
+            ocp=ocp,
+            optimality=optimality,
+            shape=shape,
+            steps=steps,
+            roll=roll,
+            slopes=slopes,
+            ends=Buffered(ends),
+            starts=Buffered(starts),
+            one=(step, slope),
+        )
+
+    def finer(self) -> "Extremals":
+        """Return the same with half the step; nothing is derived again."""
+        (step, slope), steps, segments = self.one, 2 * self.steps, self.shape.segments
+        roll = Buffered(step.mapaccum(steps).map(segments))
+        return replace(self, steps=steps, roll=roll, slopes=Buffered(slope.map(segments * steps)))
 
     # -- the boundary value problem --------------------------------------------------------
 

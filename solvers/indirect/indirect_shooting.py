@@ -21,6 +21,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     instance,
+    positive,
     whole,
 )
 from solvers.indirect.continuation import (
@@ -77,10 +78,12 @@ class IndirectShooting(Solver):
         whole(self.segments, "indirect shooting: segments")
         whole(self.steps, "indirect shooting: steps", least=self.segments)
         instance(self.integrator, Integrator, "indirect shooting: integrator")
-        if self.max_steps < 1 or not (self.tolerance > 0.0 and self.delta > 0.0):
-            raise ProblemError(
-                "indirect shooting needs at least one Newton step, positive tolerance and delta"
-            )
+        whole(self.max_steps, "indirect shooting: max_steps")
+        positive(self.tolerance, "indirect shooting: tolerance")
+        positive(self.delta, "indirect shooting: delta")
+        if self.continuation is not None:
+            kinds = (HorizonContinuation, ParameterContinuation)
+            instance(self.continuation, kinds, "indirect shooting: continuation")
         if self.jacobian not in ("exact", "finite-difference"):
             raise ProblemError(
                 f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
@@ -120,7 +123,8 @@ class IndirectShootingProgram(Program):
         started = perf_counter()
         ocp = self.extremals.ocp
         data = Data.of(ocp, x0, t0, parameters)
-        v = first_unknowns(self.extremals, data, self.schedule(data), guess or ocp.guess)
+        start = ocp.first_guess(guess)
+        v = first_unknowns(self.extremals, data, self.schedule(data), start)
         results = [self._newton(data, 1.0, v)]
         if not results[0].converged and self.solver.continuation:
             results += advanced(self.solver.continuation, data, v, self._newton)

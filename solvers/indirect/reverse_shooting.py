@@ -134,7 +134,7 @@ class ReverseShootingProgram(Program):
         ocp = self.reverse.extremals.ocp
         data = Data.of(ocp, x0, t0, parameters)
         task = _Task(self, data, Schedule.of(ocp, data, self.solver.steps))
-        first = guess or ocp.guess
+        first = ocp.first_guess(guess)
         rows = first.sample("x", np.array([1.0]), ocp.model.nx) if first else None
         solution = task.solution(data.x0 if rows is None else rows[0])
         return solution.with_(solve_time=perf_counter() - started)

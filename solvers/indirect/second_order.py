@@ -99,15 +99,14 @@ def concave_at(
     curvature = extremals.optimality.hamiltonian.control_curvature.map(len(t))
     hessians = np.array(curvature(x.T, u.T, costate.T, t[None, :], p.T)).T.reshape(-1, nu, nu)
     free = (u > np.asarray(box.lower)) & (u < np.asarray(box.upper))
-    if free.all():  # all at once, which a controller in a loop notices
-        lowest = np.linalg.eigvalsh((hessians + hessians.transpose(0, 2, 1)) / 2.0)[:, 0]
-        found = np.flatnonzero(lowest <= below)
-        return float(t[found[0]]) if found.size else None
-    for k, (hessian, f) in enumerate(zip(hessians, free, strict=True)):
-        inner = (hessian + hessian.T)[np.ix_(f, f)] / 2.0
-        if inner.size and np.linalg.eigvalsh(inner)[0] <= below:
-            return float(t[k])
-    return None
+    lowest = np.full(len(t), np.inf)
+    for pattern in np.unique(free, axis=0):  # all with the same controls free at once
+        if pattern.any():
+            at = (free == pattern).all(axis=1)
+            inner = hessians[at][:, pattern][:, :, pattern]
+            lowest[at] = np.linalg.eigvalsh((inner + inner.transpose(0, 2, 1)) / 2.0)[:, 0]
+    found = np.flatnonzero(lowest <= below)
+    return float(t[found[0]]) if found.size else None
 
 
 def _final_plane(

@@ -22,6 +22,8 @@ from ocp import (
     Start,
     Status,
     Work,
+    positive,
+    whole,
 )
 from solvers.tabular.one_step import OneStep, one_step
 from solvers.tabular.refusal import refuse_free_ends
@@ -68,8 +70,9 @@ class Greedy(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.intervals < 1 or self.max_iterations < 1:
-            raise ProblemError("Greedy needs at least one interval and one iteration")
+        whole(self.intervals, "Greedy: intervals")
+        whole(self.max_iterations, "Greedy: max_iterations")
+        positive(self.tolerance, "Greedy: tolerance")
         if not 0.0 < self.tolerance < 1.0:
             raise ProblemError(f"Greedy: tolerance = {self.tolerance}, it must be in (0, 1)")
 
@@ -146,7 +149,7 @@ class GreedyProgram(Program):
         ocp, n, m = self.ocp, self.n, self.ocp.model
         data = Data.of(ocp, x0, t0, parameters)
         nodes = np.linspace(0.0, 1.0, n + 1)
-        guess = guess or ocp.guess
+        guess = ocp.first_guess(guess)
         first = guess.sample("u", nodes[:1], m.nu) if guess else None
         u = ocp.control_bounds.clip(np.zeros(m.nu) if first is None else first[0])
         walk = self._walk(data, nodes, u)

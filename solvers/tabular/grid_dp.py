@@ -21,6 +21,7 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    whole,
 )
 from solvers.tabular.bellman import Bellman, Table
 from solvers.tabular.grid import Axis, Grid
@@ -80,8 +81,7 @@ class GridDP(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.intervals < 1:
-            raise ProblemError(f"GridDP needs at least one interval, not {self.intervals}")
+        whole(self.intervals, "GridDP: intervals")
         for name in ("terminal_slack", "accuracy", "memory"):
             if not getattr(self, name) >= 0.0:
                 raise ProblemError(f"GridDP: {name} = {getattr(self, name)}, it must be >= 0")

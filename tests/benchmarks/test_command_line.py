@@ -50,8 +50,8 @@ def test_nothing_to_run_is_said_and_is_no_success(tmp_path, capsys):
 def test_bad_words_end_with_a_message(arguments, capsys):
     with pytest.raises(SystemExit) as end:
         main(arguments)
-    assert end.value.code != 0
-    assert str(end.value.code) + capsys.readouterr().err
+    assert end.value.code == 2
+    assert capsys.readouterr().err
 
 
 def test_the_picture_is_drawn(tmp_path):

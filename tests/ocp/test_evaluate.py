@@ -531,3 +531,18 @@ def test_a_discrete_control_meets_its_constraints_at_the_start_of_its_step_only(
     worse = evaluate(trajectory(ocp, np.array([[-0.5], [-0.2]])))
     assert worse.violation == pytest.approx(0.2)
     assert "'mixed' at t = 1 s" in worse.worst
+
+
+@pytest.mark.parametrize("apart", [1e-8, 1e-11, 1e-14])
+@pytest.mark.parametrize("kind", ["linear", "held"])
+@pytest.mark.filterwarnings("error")
+def test_stationarity_of_nodes_closer_than_any_step(kind: Any, apart: float) -> None:
+    """They carry no part of the cost: nothing is divided by their length."""
+    ocp = integrator()
+    t = np.array([0.0, 0.5, 0.5 + apart, 0.5 + 2.0 * apart, 1.0]) * ocp.duration
+    rows = 4 if kind == "held" else 5
+    plain = trajectory(ocp, np.ones((4, 1))).with_(control_kind=kind, u=np.ones((rows, 1)))
+    close, even = evaluate(plain.with_(t=t)), evaluate(plain)
+    assert close.cost == pytest.approx(even.cost, rel=REFEREE)
+    assert close.stationarity is not None
+    assert np.isfinite(close.stationarity)

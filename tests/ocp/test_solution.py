@@ -4,10 +4,27 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from ocp import OCP, Guess, ProblemError, Solution, SolverError, Status, Work, evaluate, solve
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    FreeTime,
+    Guess,
+    Model,
+    Parameter,
+    ProblemError,
+    Solution,
+    SolverError,
+    Status,
+    Work,
+    evaluate,
+    solve,
+)
+from ocp.probe import probe
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.problems import energy, integrator, pendulum, trajectory
 from tests.tolerances import ORDER, ROUNDING
@@ -211,7 +228,7 @@ def test_load_refuses_another_problem(tmp_path: Path) -> None:
     path = full().save(tmp_path / "s")
     with pytest.raises(ProblemError, match="solves 'pendulum', not 'energy'"):
         Solution.load(path, energy())
-    with pytest.raises(ProblemError, match="x has shape"):
+    with pytest.raises(ProblemError, match=r"solves another .pendulum.: dynamics, running cost"):
         Solution.load(path, integrator(name="pendulum"))
 
 
@@ -240,6 +257,103 @@ def test_load_refuses_an_unknown_status(tmp_path: Path) -> None:
         Solution.load(path, pendulum())
 
 
-def test_a_missing_file_is_a_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        Solution.load(tmp_path / "nowhere.npz", pendulum())
+@pytest.mark.parametrize("name", ["nowhere.npz", ""])
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ProblemError, match=r"the saved solution .* cannot be read: [NI]") as raised:
+        Solution.load(tmp_path / name, pendulum())
+    assert isinstance(raised.value.__cause__, OSError)
+
+
+# -- whether a file belongs to a problem ------------------------------------------------
+
+
+def moved(**changes: Any) -> OCP:
+    """A problem with everything in it that a probe looks at, changed."""
+    x, u, k = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("k")
+    f = changes.pop("f", lambda x, u: ca.vertcat(x[1], u - ca.sin(x[0])))(x, u)
+    ends = changes.pop("ends", 1.0)
+    given = {
+        "running_cost": u**2 + k * x[0] ** 2,
+        "terminal_cost": x[1] ** 2,
+        "control_bounds": Box(-2.0, 2.0),
+        "state_bounds": Box([-5.0, -np.inf], 5.0),
+        "constraints": (
+            Constraint("wall", x[0] + u, upper=4.0),
+            Constraint("end", x[0], ends, ends, at="terminal"),
+        ),
+        "horizon": 1.0,
+        "x0": [0.0, 0.0],
+        "parameters": (Parameter("k", k, 1.0),),
+    }
+    costs = {name: changes.pop(name)(x, u) for name in list(changes) if name.endswith("cost")}
+    model = Model(name="m", x=x, u=u, f=f)
+    return OCP(name="moved", model=model, **(given | changes | costs))
+
+
+def of(problem: OCP) -> Solution:
+    t = np.linspace(0.0, 1.0, 5)
+    return Solution(
+        problem=problem,
+        solver="none",
+        status=Status.SOLVED,
+        t=t,
+        x=np.zeros((5, 2)),
+        x0=np.zeros(2),
+        costate=np.zeros((5, 2)),
+        u=np.zeros((4, 1)),
+        cost=0.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"f": lambda x, u: ca.vertcat(x[1], u - 1.01 * ca.sin(x[0]))}, "dynamics"),
+        ({"running_cost": lambda x, u: u**2}, "running cost"),
+        ({"terminal_cost": lambda x, u: 1.001 * x[1] ** 2}, "terminal cost"),
+        ({"control_bounds": Box(-2.0, 2.1)}, "control bounds"),
+        ({"state_bounds": Box()}, "state bounds"),
+        ({"ends": 1.1}, "terminal constraints"),
+        ({"constraints": ()}, "path constraints, terminal constraints"),
+        ({"horizon": 1.5}, "horizon"),
+        ({"horizon": FreeTime(1.0)}, "horizon"),
+    ],
+)
+def test_load_refuses_a_problem_that_says_something_else(
+    tmp_path: Path, changes: dict[str, Any], named: str
+) -> None:
+    path = of(moved()).save(tmp_path / "s")
+    with pytest.raises(ProblemError, match=f"solves another 'moved': {named} differ"):
+        Solution.load(path, moved(**changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"x0": [0.5, 0.1]},
+        {"guess": Guess(u=[1.0])},
+        # The same, written in another way.
+        {"terminal_cost": lambda x, u: x[1] * x[1] + 0.0 * x[0]},
+        {"f": lambda x, u: ca.vertcat(x[1], -ca.cos(x[0] - np.pi / 2) + u)},
+    ],
+)
+def test_load_takes_the_same_problem(tmp_path: Path, changes: dict[str, Any]) -> None:
+    problem = moved(**changes)
+    path = of(moved()).save(tmp_path / "s")
+    assert Solution.load(path, problem).problem is problem
+
+
+def test_a_probe_may_be_no_number(tmp_path: Path) -> None:
+    """The square root is one at the start, and at some of the points not."""
+    problem = moved(running_cost=lambda x, u: ca.sqrt(1.0 - 100.0 * ca.sumsqr(x)))
+    assert np.isnan(probe(problem)["running cost"]).any()
+    assert Solution.load(of(problem).save(tmp_path / "s"), problem).cost == 0.0
+
+
+def test_a_file_without_a_probe_is_known_by_its_name(tmp_path: Path) -> None:
+    path = of(moved()).save(tmp_path / "s")
+    with np.load(path) as file:
+        content: dict[str, Any] = {n: file[n] for n in file.files if not n.startswith("probe/")}
+    np.savez(path, **content)
+    assert Solution.load(path, moved(horizon=1.5)).cost == 0.0

@@ -91,5 +91,5 @@ def test_a_mirror_image_is_another_optimum() -> None:
 
 
 def test_no_start_is_refused() -> None:
-    with pytest.raises(ProblemError, match="at least one start"):
+    with pytest.raises(ProblemError, match="starts must be a whole number of at least 1"):
         multistart(van_der_pol(), MultipleShooting(5), 0, 0)

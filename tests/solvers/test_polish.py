@@ -1,12 +1,20 @@
 """Polish: starts again from a finer grid, refines to an accuracy, and says where it could not."""
 
+import re
 import sys
+from math import inf, nan
+from typing import Any, cast
 
 import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, arm_cases
-from ocp import Solution, Status, solve
+from ocp import ProblemError, Solution, Status, evaluate, solve
 from solvers import IndirectShooting, MultipleShooting, polish
+from solvers.indirect.halved import change, finer
+from solvers.indirect.indirect_shooting import IndirectShootingProgram
+from solvers.indirect.second_order import SecondOrder
+from tests.solvers.problems import saturated_transfer
+from tests.tolerances import RESIDUAL
 
 
 def case_called(name: str) -> Case:
@@ -22,11 +30,22 @@ def test_starts_again_from_a_finer_grid_where_newton_fails() -> None:
     direct = held(case_called("arm-024-sum"))
     plain = solve(direct.problem, IndirectShooting(segments=15), guess=direct)
     assert plain.status is Status.NO_PROGRESS
-    extremal = polish(direct)
+    extremal = polish(direct, accuracy=1e-4)
     assert extremal.status is Status.SOLVED
     # Both tries are counted.
     assert extremal.iterations > plain.iterations
     assert extremal.work.rollouts > plain.work.rollouts
+
+
+@pytest.mark.slow
+def test_an_extremal_that_finer_steps_lose_is_inaccurate() -> None:
+    """Arm 24 passes its obstacle where the cost's curvature jumps: 300 steps are worth 4 digits."""
+    extremal = polish(held(case_called("arm-024-sum")))
+    assert extremal.status is Status.INACCURATE
+    assert re.match(r"half of its 300 steps would change the cost by 1.\de-04", extremal.message)
+    assert "with 600: NO_PROGRESS, residual" in extremal.message
+    # What is returned is the extremal that was found.
+    assert extremal.residual < RESIDUAL
 
 
 def test_reaches_an_accuracy_from_an_inaccurate_start() -> None:
@@ -44,4 +63,54 @@ def test_says_when_the_steps_run_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["solvers.polish"], "_MOST_STEPS", 700)
     extremal = polish(held(case_called("rayleigh")), accuracy=1e-13)
     assert extremal.status is Status.INACCURATE
-    assert extremal.message == "the cost still changes by more than 1e-13 at 600 steps"
+    assert extremal.message.startswith("half of its 600 steps would change the cost by 1.7e-07")
+
+
+@pytest.mark.parametrize("limit", [4.5, 4.2])
+def test_doubles_the_steps_where_a_control_meets_its_bound(limit: float) -> None:
+    """Without being asked: 300 steps leave 1e-5 of the cost and of the end."""
+    ocp, cost = saturated_transfer(limit)
+    extremal = polish(solve(ocp, MultipleShooting(75)))
+    verdict = evaluate(extremal)
+    assert extremal.status is Status.SOLVED
+    assert len(extremal.t) - 1 > 300
+    assert verdict.cost == pytest.approx(cost, rel=1e-6)
+    assert verdict.violation < 1e-5
+
+
+@pytest.mark.parametrize("name", ["rayleigh", "van-der-pol"])
+def test_the_change_under_half_the_step_is_predicted(name: str) -> None:
+    direct = held(case_called(name))
+    program = IndirectShooting(segments=15).build(direct.problem)
+    half = finer(program)
+    extremal, then = program.run(guess=direct), half.run(guess=direct)
+    predicted = change(extremal, program, half)
+    assert predicted.cost == pytest.approx(abs(then.cost - extremal.cost), rel=1e-2)
+    assert 0.0 < predicted.state < 1e-5
+
+
+def test_curvature_is_tested_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    tested, test = [], IndirectShootingProgram.second_order
+
+    def counted(program: IndirectShootingProgram, solution: Solution) -> SecondOrder:
+        tested.append(len(solution.t) - 1)
+        return test(program, solution)
+
+    monkeypatch.setattr(IndirectShootingProgram, "second_order", counted)
+    extremal = polish(held(case_called("rayleigh")), accuracy=1e-10)
+    assert tested == [len(extremal.t) - 1]
+    assert tested[0] > 1000
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1.0, nan, inf, "fine", None, [1e-8]])
+def test_a_bad_accuracy(accuracy: Any) -> None:
+    with pytest.raises(ProblemError, match="polish: accuracy"):
+        polish(held(case_called("van-der-pol")), accuracy=accuracy)
+
+
+def test_what_is_no_solution_is_refused_by_name() -> None:
+    ocp: Any = case_called("van-der-pol").build()
+    with pytest.raises(ProblemError, match="polish: solution is a OCP, Solution is needed"):
+        polish(ocp)
+    with pytest.raises(ProblemError, match="polish: solver is a MultipleShooting"):
+        polish(solve(ocp, MultipleShooting(20)), solver=cast("Any", MultipleShooting()))

@@ -89,7 +89,7 @@ SMOOTH_PROBLEMS = (
         zermelo,
         "zermelo",
         root(5.457865263561, "two equations for the headings at both ends"),
-        DIRECT,
+        (*DIRECT, "indirect"),
         "smooth",
         "[Bryson & Ho 1975, section 2.7, example 1]",
         published=(Published(5.46, "[Bryson & Ho 1975, section 2.7, example 1]"),),

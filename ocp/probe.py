@@ -1,0 +1,70 @@
+"""What a problem says, as numbers: whether a file belongs to it."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ocp.constraint import Box, Constraint
+
+if TYPE_CHECKING:
+    from ocp.problem import OCP
+
+# So many points at which functions are looked at; functions that agree there are the same.
+_POINTS = 3
+# Another compiler or another order of the same sum changes the last digits.
+_RELATIVE = 1e-9
+
+
+def probe(ocp: "OCP") -> dict[str, np.ndarray]:
+    """Return the values of a problem's functions at fixed random points, and its bounds.
+
+    Values, not expressions: they stay the same where a term is written in another way or another
+    version of CasADi writes it down. Start, parameter values and guess are left out: they belong
+    to a run.
+    """
+    m, n_p, functions = ocp.model, ocp.p.numel(), ocp.functions
+    rng = np.random.default_rng(0)
+    points = [
+        (rng.normal(size=m.nx), rng.normal(size=m.nu), rng.uniform(), rng.normal(size=n_p))
+        for _ in range(_POINTS)
+    ]
+    along = {
+        "dynamics": functions.rate,
+        "running cost": functions.running_cost,
+        "path constraints": functions.path,
+    }
+    at_ends = {
+        "terminal cost": functions.terminal_cost,
+        "initial constraints": functions.initial,
+        "terminal constraints": functions.terminal,
+    }
+    values = {name: [f(*point) for point in points] for name, f in along.items()}
+    values |= {name: [f(x, t, p) for x, _, t, p in points] for name, f in at_ends.items()}
+    parts = {
+        name: np.concatenate([np.array(v).ravel() for v in each]) for name, each in values.items()
+    }
+    parts |= {
+        "control bounds": _stacked(ocp.control_bounds),
+        "state bounds": _stacked(ocp.state_bounds),
+        "horizon": np.concatenate([_stacked(ocp.time_box), [ocp.model.dt or 0.0]]),
+    }
+    for at in ("path", "initial", "terminal"):
+        bounds = [_stacked(c) for c in ocp.at(at)]
+        parts[f"{at} constraints"] = np.concatenate([parts[f"{at} constraints"], *bounds])
+    return parts
+
+
+def differing(kept: Mapping[str, np.ndarray], here: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """Return the parts in which two problems differ; NaN and infinity agree with themselves."""
+    return tuple(
+        name
+        for name in here
+        if name not in kept
+        or kept[name].shape != here[name].shape
+        or not np.allclose(kept[name], here[name], _RELATIVE, _RELATIVE, equal_nan=True)
+    )
+
+
+def _stacked(box: Box | Constraint) -> np.ndarray:
+    return np.concatenate([np.ravel(box.lower), np.ravel(box.upper)])
