@@ -17,8 +17,9 @@ def once_per_problem(derive: "Callable[[OCP], T]") -> "Callable[[OCP], T]":
 
     @wraps(derive)
     def derived(ocp: "OCP") -> T:
-        if ocp not in kept:
-            kept[ocp] = derive(ocp)
-        return kept[ocp]
+        found = kept.get(ocp)
+        if found is None:
+            found = kept[ocp] = derive(ocp)
+        return found
 
     return derived

@@ -237,7 +237,7 @@ class MPC:
             )
         values, why = self._informed(at, parameters)
         since = plan.t[0] if why and plan else at
-        is_measured = bool(np.isfinite(state).all())
+        is_measured = all(map(isfinite, state.tolist()))
         if not is_measured:  # without a plan the backup law sees what was measured
             state = state if plan is None else plan.state(at)
         elif self.compensate and self.memory.pending:

@@ -109,7 +109,8 @@ _SUGGESTIONS: tuple[tuple[str, Callable[[OCP, float], Feedback]], ...] = (
 
 def _sent(law: Feedback, ocp: OCP, applied: Applied) -> Answer:
     """Return what the plant receives for the controls of a law."""
-    return lambda x, t, p: applied.of(ocp, x, law(x, t, p), t, p)
+    input_of = applied.sending(ocp)
+    return lambda x, t, p: input_of(x, law(x, t, p), t, p)
 
 
 def is_redundant(ocp: OCP) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp.constraint import Box
-from ocp.mpc.applied import Applied
+from ocp.mpc.applied import Applied, Sending
 from ocp.mpc.asking import INSIDE, asked
 from ocp.mpc.decision import ControlRefused, Outcome
 from ocp.mpc.fallback import Answer, Backup
@@ -221,9 +221,7 @@ class Ladder:
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
         u = controls(plan, moment.at + middle)
-        given = self.applied.of(
-            self.ocp, moment.start, u, moment.at, self._parameters(moment, moment.at)
-        )
+        given = self._sending(moment.start, u, moment.at, self._parameters(moment, moment.at))
         return self._within(moment, given, outcome, plan)
 
     def _within(
@@ -231,8 +229,9 @@ class Ladder:
     ) -> Choice | None:
         """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
         inside = self.box.clip(given)
-        # Where an input is not finite, nor is this.
-        excess = float(np.abs(given - inside).max(initial=0.0))
+        moved = given - inside
+        # Where an input is not finite, nor is this: what is no number is not zero, either.
+        excess = float(np.abs(moved).max()) if np.count_nonzero(moved) else 0.0
         if not isfinite(excess):
             moment.reasons.append(f"the input {given} is not finite")
             return None
@@ -262,6 +261,11 @@ class Ladder:
         """Whether there is anything along the way that a plan could violate."""
         ocp = self.ocp
         return bool(ocp.at("path")) or ocp.state_bounds.is_active or ocp.control_bounds.is_active
+
+    @cached_property
+    def _sending(self) -> Sending:
+        """What makes an input of a state and a control."""
+        return self.applied.sending(self.ocp)
 
     @cached_property
     def box(self) -> Box:
