@@ -29,7 +29,7 @@ class Buffered:
         """Evaluate; inputs must have the function's sizes, a vector may be (n,)."""
         buffers = self._buffers
         for place, given in zip(buffers.inputs, inputs, strict=True):
-            place.put(np.asarray(given, dtype=float))
+            place.put(given)
         buffers.evaluate()
         return tuple([place.get() for place in buffers.outputs])
 
@@ -61,18 +61,22 @@ class _Place:
     def __init__(self, sparsity: ca.Sparsity) -> None:
         rows, columns = self._shape = sparsity.shape
         self.values = np.zeros(sparsity.nnz())
-        self._vectors = ((rows,), ()) if rows == columns == 1 else ((rows,),) * (columns == 1)
         self._where = None if sparsity.is_dense() else np.array(sparsity.find(), dtype=int)
         self._dense = self.values if self._where is None else np.zeros(rows * columns)
         self._matrix = self._dense.reshape(self._shape, order="F")
+        # What each shape that may be given is written to: all are the same memory.
+        self._views: dict[tuple[int, ...], np.ndarray] = {self._shape: self._matrix}
+        if columns == 1:
+            self._views[(rows,)] = self._dense
+        if rows == columns == 1:
+            self._views[()] = self._dense.reshape(())
 
-    def put(self, given: np.ndarray) -> None:
-        if given.shape == self._shape:
-            self._matrix[...] = given
-        elif given.shape in self._vectors:
-            self._dense[...] = given
-        else:
-            raise ValueError(f"an input has shape {given.shape}, {self._shape} is needed")
+    def put(self, given: ArrayLike) -> None:
+        numbers = np.asarray(given, dtype=float)
+        view = self._views.get(numbers.shape)
+        if view is None:
+            raise ValueError(f"an input has shape {numbers.shape}, {self._shape} is needed")
+        view[...] = numbers
         if self._where is not None:
             self.values[:] = self._dense[self._where]
 

@@ -26,10 +26,17 @@ def _arm_options(parser: ArgumentParser) -> None:
     parser.add_argument("--intervals", nargs="*", type=positive, default=INTERVALS, metavar="N")
     parser.add_argument("--links", nargs="*", type=positive, default=LINKS, metavar="n")
     parser.add_argument("--count", type=positive, default=40, metavar="K", help="steps measured")
+    parser.add_argument("--only-driver", action="store_true", help="time around the solver only")
 
 
 def _arm(options: Namespace, console: Console) -> int:
-    print_arm_speed(console, options.intervals, options.links, options.count)
+    print_arm_speed(
+        console,
+        options.intervals,
+        options.links,
+        options.count,
+        only_driver=options.only_driver,
+    )
     return 0
 
 

@@ -16,7 +16,7 @@ from benchmarks.speed.arm import (
     exponent,
     stagewise,
 )
-from benchmarks.speed.driver_overhead import driver_overhead, overhead_line
+from benchmarks.speed.driver_overhead import driver_overhead, overhead_table
 from benchmarks.speed.stage_code import StageCode, code_table
 
 
@@ -25,8 +25,18 @@ def print_arm_speed(
     intervals: Sequence[int] = INTERVALS,
     links: Sequence[int] = LINKS,
     count: int = 40,
+    *,
+    only_driver: bool = False,
 ) -> None:
-    """Measure and print everything."""
+    """Measure and print everything, or only what the driver costs around a solver."""
+    if not only_driver:
+        _print_steps(console, intervals, links, count)
+    console.print(overhead_table(driver_overhead()))
+
+
+def _print_steps(
+    console: Console, intervals: Sequence[int], links: Sequence[int], count: int
+) -> None:
     console.print(ratio_table(arm_steps(contenders(), arm(), count)))
     if intervals:
         grown = {n: arm_steps(contenders(n), arm(), count) for n in intervals}
@@ -36,7 +46,6 @@ def print_arm_speed(
         grown = {n: arm_steps(stagewise(), arm(n), count, (True,)) for n in links}
         console.print(growth_table(grown, f"N = {N}: one step in ms over the links"))
         console.print(code_table([StageCode.of(n) for n in links]))
-    console.print(overhead_line(driver_overhead()), highlight=False, soft_wrap=True)
 
 
 def ratio_table(steps: Sequence[Steps]) -> Table:

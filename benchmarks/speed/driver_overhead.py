@@ -1,60 +1,85 @@
 """What the receding-horizon driver and its recorder cost around a solver, on the arm.
 
-The solver is one that knows the answer. Its own time is that of the ``Solution`` it builds and
-checks; reading the warm start, which any solver does with as much of it as it wants, is timed
-apart, for the states and controls that a direct method reads. All else is the driver's: the
-checks of measurement and plan, the input from both, the decision.
+All is timed but the solver's ``run``: the checks of measurement and plan, the input from both, the
+decision; of the warm start only that it is offered. The same driver is timed around four solvers,
+in turns. Three are a stand-in that knows the answer: alone; after it has really solved the problem
+with compiled fatrop and thrown that away; after it has slept. The last is compiled fatrop itself.
+What the second costs more than the first is what the driver's own code and data cost once somebody
+else has used the caches of the processor. The third says that this needs no solver: a controller
+that waits for its next sample is in no better place.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, sleep
 
 import numpy as np
 from numpy.typing import ArrayLike
+from rich.table import Table
 
-from benchmarks.speed.arm import DT, N, arm
+from benchmarks.speed.arm import DT, NOISE, N, arm
 from ocp import MPC, OCP, Applied, FlightRecorder, Program, Solution, Solver, Start, solve
 from solvers import MultipleShooting
 
-# Steps at the beginning that do not count.
-_WARM = 3
+FATROP = MultipleShooting(N, backend="fatrop", compiled=True)
+# Turns at the beginning that do not count, and steps of a turn: the last one does.
+_WARM, _TURN = 3, 2
+_SLEEP = 0.01  # [s]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The least and the median of some times [s]."""
+
+    least: float
+    median: float
+
+    @classmethod
+    def of(cls, times: ArrayLike) -> "Spread":
+        """Take the last step of every turn but the first ones."""
+        counted = np.asarray(times)[_TURN - 1 :: _TURN][_WARM:]
+        return cls(float(counted.min()), float(np.median(counted)))
+
+    def __str__(self) -> str:
+        """Return both in microseconds."""
+        return f"{1e6 * self.least:.0f} / {1e6 * self.median:.0f}"
 
 
 @dataclass(frozen=True)
 class Overhead:
-    """Times around the solver, a step [s]: median and 5 % quantile each."""
+    """Times of a step around one solver.
 
-    driver: tuple[float, float]
-    warm_start: tuple[float, float]
-    recorder: tuple[float, float]
+    Attributes:
+        solver: which.
+        solving: of the solver's own.
+        driver: of all else.
+        recorder: of the flight recorder on top.
+    """
 
-
-@dataclass(frozen=True, eq=False)
-class _Times:
-    """What each run took [s]."""
-
-    reading: list[float] = field(default_factory=list)
-    whole: list[float] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class _Known(Solver):
-    """A solver that knows the answer and counts its own time."""
-
-    answer: Solution
-    times: _Times
-
-    def build(self, ocp: OCP) -> "_KnownProgram":
-        return _KnownProgram(self, np.linspace(0.0, 1.0, N + 1))
+    solver: str
+    solving: Spread
+    driver: Spread
+    recorder: Spread
 
 
 @dataclass(frozen=True, eq=False)
-class _KnownProgram(Program):
-    solver: _Known
-    nodes: np.ndarray
+class _Timed(Solver):
+    """A solver whose runs are timed, in the order in which they are made."""
+
+    inner: Solver
+    times: list[float] = field(default_factory=list)
+
+    def build(self, ocp: OCP) -> "_TimedProgram":
+        return _TimedProgram(self.inner.build(ocp), self.times)
+
+
+@dataclass(frozen=True, eq=False)
+class _TimedProgram(Program):
+    inner: Program
+    times: list[float]
 
     def run(
         self,
@@ -64,47 +89,104 @@ class _KnownProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: Start | None = None,
     ) -> Solution:
-        started, answer = perf_counter(), self.solver.answer
-        if guess:
-            guess.sample("x", self.nodes, answer.x.shape[1])
-            guess.sample("u", self.nodes[:-1], answer.u.shape[1])
-        read = perf_counter()
-        found = answer.with_(t=answer.t - answer.t[0] + t0)
-        self.solver.times.reading.append(read - started)
-        self.solver.times.whole.append(perf_counter() - started)
+        started = perf_counter()
+        found = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        self.times.append(perf_counter() - started)
         return found
 
 
-def driver_overhead(count: int = 500) -> Overhead:
-    """Measure a number of steps."""
-    ocp, times = arm(), _Times()
-    answer = solve(ocp, MultipleShooting(N)).or_raise()
-    mpc = MPC(ocp=ocp, solver=_Known(answer, times), dt=DT, applied=Applied("rate"))
-    whole, recording, x = [], [], ocp.start()
-    with TemporaryDirectory() as folder, FlightRecorder(mpc, Path(folder) / "flight") as recorder:
-        for k in range(count + _WARM):
-            started = perf_counter()
-            decision = mpc.step(x, k * DT)
-            between = perf_counter()
-            recorder.watch(x, decision)
-            recording.append(perf_counter() - between)
-            whole.append(between - started)
-    around = np.array(whole) - np.array(times.whole)
-    return Overhead(*(_typical(t) for t in (around, times.reading, recording)))
+# What else a stand-in does with x0 and t0.
+_Work = Callable[[ArrayLike | None, float], object]
 
 
-def overhead_line(found: Overhead) -> str:
-    """Return the times in words."""
-    driver, warm_start, recorder = (
-        f"{1e6 * median:.0f} us (5 % quantile {1e6 * least:.0f} us)"
-        for median, least in (found.driver, found.warm_start, found.recorder)
-    )
-    return (
-        f"the driver around its solver takes {driver} a step, reading the warm start "
-        f"{warm_start}, the flight recorder {recorder} on top"
-    )
+@dataclass(frozen=True, eq=False)
+class _StandIn(Solver):
+    """A solver that knows the answer."""
+
+    answer: Solution
+    work: _Work
+
+    def build(self, ocp: OCP) -> "_StandInProgram":
+        return _StandInProgram(self.answer, self.work)
 
 
-def _typical(times: ArrayLike) -> tuple[float, float]:
-    counted = np.asarray(times)[_WARM:]
-    return float(np.median(counted)), float(np.quantile(counted, 0.05))
+@dataclass(frozen=True, eq=False)
+class _StandInProgram(Program):
+    answer: Solution
+    work: _Work
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Start | None = None,
+    ) -> Solution:
+        self.work(x0, t0)
+        return self.answer.with_(t=self.answer.t - self.answer.t[0] + t0)
+
+
+def _contenders(ocp: OCP) -> dict[str, Solver]:
+    answer, real = solve(ocp, MultipleShooting(N)).or_raise(), FATROP.build(ocp)
+
+    def solved(x0: ArrayLike | None, t0: float) -> None:
+        real.run(x0=x0, t0=t0, guess=answer)
+
+    return {
+        "stand-in": _StandIn(answer, lambda x0, t0: None),
+        "stand-in, after fatrop": _StandIn(answer, solved),
+        f"stand-in, after {1e3 * _SLEEP:.0f} ms asleep": _StandIn(
+            answer, lambda x0, t0: sleep(_SLEEP)
+        ),
+        "fatrop": FATROP,
+    }
+
+
+def driver_overhead(count: int = 200) -> list[Overhead]:
+    """Measure a step of every contender, a number of times in turns, for the same states.
+
+    In its turn a contender decides twice and the second decision counts, so that what it finds in
+    the caches is its own.
+    """
+    ocp, rng = arm(), np.random.default_rng(0)
+    timed = {name: _Timed(solver) for name, solver in _contenders(ocp).items()}
+    racing = {
+        name: MPC(ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"))
+        for name, solver in timed.items()
+    }
+    whole, recording = ({name: [] for name in racing} for _ in range(2))
+    with TemporaryDirectory() as folder, ExitStack() as files:
+        recorders = {
+            name: files.enter_context(FlightRecorder(mpc, Path(folder) / f"flight {k}"))
+            for k, (name, mpc) in enumerate(racing.items())
+        }
+        for _ in range(count + _WARM):
+            x = ocp.start() + NOISE * rng.normal(size=ocp.model.nx)
+            for name, mpc in [turn for turn in racing.items() for _ in range(_TURN)]:
+                started = perf_counter()
+                decision = mpc.step(x, 0.0)
+                between = perf_counter()
+                recorders[name].watch(x, decision)
+                recording[name].append(perf_counter() - between)
+                whole[name].append(between - started)
+    return [
+        Overhead(
+            name,
+            Spread.of(solver.times),
+            Spread.of(np.subtract(whole[name], solver.times)),
+            Spread.of(recording[name]),
+        )
+        for name, solver in timed.items()
+    ]
+
+
+def overhead_table(found: list[Overhead]) -> Table:
+    """Return one line a contender."""
+    table = Table(title=f"arm, 3 links, N = {N}: a step in us, least / median")
+    for column in ("around", "the solver", "the driver", "the flight recorder"):
+        justify = "left" if column == "around" else "right"
+        table.add_column(column, justify=justify, no_wrap=True)
+    for line in found:
+        table.add_row(line.solver, str(line.solving), str(line.driver), str(line.recorder))
+    return table

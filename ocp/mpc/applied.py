@@ -1,15 +1,18 @@
 """What the plant receives, and within which bounds."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ocp.buffered import Buffered
-from ocp.cache import once_per_problem
 from ocp.constraint import Box
 from ocp.errors import ProblemError
 from ocp.problem import OCP
+
+# (x, u, t, p) -> input (m,).
+Sending = Callable[[np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,9 @@ class Applied:
             raise ProblemError(f"{ocp.name}: a discrete-time model has no rate to apply")
         return (self.bounds or Box()).sized(ocp.model.nx, f"{ocp.name}: bounds of the rate")
 
-    def of(self, ocp: OCP, x: np.ndarray, u: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
-        """Return the input for a state and a control of the problem."""
+    def sending(self, ocp: OCP) -> Sending:
+        """Return what makes an input of a state and a control of the problem."""
         if self.what == "control":
-            return u
-        return _rate(ocp)(x, u, t, p)[0].ravel()
-
-
-@once_per_problem
-def _rate(ocp: OCP) -> Buffered:
-    return Buffered(ocp.functions.rate)
+            return lambda x, u, t, p: u
+        rate = Buffered(ocp.functions.rate)
+        return lambda x, u, t, p: rate(x, u, t, p)[0].ravel()

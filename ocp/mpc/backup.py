@@ -1,21 +1,35 @@
 """Laws for when there is no plan: the saturated regulator, and instantaneous control."""
 
-from collections.abc import Callable
-from typing import Literal
+from dataclasses import replace
+from typing import Literal, Protocol
 
 import casadi as ca
 import numpy as np
 
-from ocp.errors import ProblemError
+from ocp.constraint import Box
+from ocp.errors import ProblemError, UnsupportedProblem
 from ocp.expressions import numbers
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import stationary
 from ocp.linear.structure import linear_quadratic
 from ocp.optimality import derive
+from ocp.parameters import Parameter, Signal
 from ocp.problem import OCP
 
-# (x, t) -> u (m,).
-Feedback = Callable[[np.ndarray, float], np.ndarray]
+
+class Feedback(Protocol):
+    """(x, t) -> input (m,), for parameters as declared or as they are now."""
+
+    def __call__(self, x: np.ndarray, t: float, p: np.ndarray | None = None) -> np.ndarray:
+        """Return the input.
+
+        Args:
+            x: state (nx,).
+            t: time [s].
+            p: parameters and signals at that time, stacked (n_p,); default: the declared ones,
+                of a signal the first sample.
+        """
+        ...
 
 
 def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Feedback:
@@ -25,32 +39,61 @@ def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Feedback:
 
         u = \mathrm{clip}\bigl(-Kx - (R + B'PB)^{-1} (r + B'(Pc + p))\bigr)
 
-    P and K solve the algebraic Riccati equation, p is the linear term of the cost-to-go; with the
-    references of the first stage, as if they stayed for ever. A ``backup`` of ``MPC`` that needs
-    no solver; state constraints it does not know.
+    P and K solve the algebraic Riccati equation, p is the linear term of the cost-to-go; with
+    references and parameters as they are at that instant, as if they stayed for ever. A ``backup``
+    of ``MPC`` that needs no solver; constraints other than the control bounds it does not know.
 
     Args:
-        ocp: linear-quadratic; its horizon and terminal cost play no part.
+        ocp: linear dynamics and quadratic running cost; horizon, constraints and terminal cost
+            play no part.
         dt: sampling interval of a continuous-time problem [s]; None: it is discrete.
 
     Raises:
-        UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse.
+        UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse, and a matrix that
+            depends on time or parameters.
     """
-    sampled = ocp if dt is None else discretise(ocp, dt)
-    lq = linear_quadratic(sampled)
-    matrices = lq.sample_matrices(lq.declared)
-    regulator, terms = stationary(matrices, ocp.name), lq.on(lq.declared)
-    a, b, weight = matrices.A[0], matrices.B[0], matrices.R[0]
-    c, q, r = terms.c[0], terms.q[0], terms.r[0]
-    k, p = regulator.K, regulator.P
-    closed = a - b @ k
-    slope = np.linalg.solve(np.eye(len(a)) - closed.T, q - k.T @ r + closed.T @ p @ c)
-    offset = np.linalg.solve(weight + b.T @ p @ b, r + b.T @ (p @ c + slope))
+    endless = _endless(ocp, dt)
+    lq = linear_quadratic(endless if dt is None else discretise(endless, dt))
+    if lq.fixed is None:
+        raise UnsupportedProblem(
+            f"{ocp.name}: a matrix depends on time or parameters, a regulator needs all of them "
+            "constant"
+        )
+    regulator = stationary(lq.fixed, ocp.name)
+    a, b, weight = lq.fixed.A[0], lq.fixed.B[0], lq.fixed.R[0]
+    k, cost_to_go = regulator.K, regulator.P
+    closed, pressed = a - b @ k, weight + b.T @ cost_to_go @ b
+    n, m = ocp.model.nx, ocp.model.nu
+    declared = endless.parameter_values().at(0.0)[0]
 
-    def law(x: np.ndarray, t: float) -> np.ndarray:
+    def law(x: np.ndarray, t: float, p: np.ndarray | None = None) -> np.ndarray:
+        given = declared if p is None else p
+        vectors = np.array(lq.stage_vectors(t, given)).ravel()
+        c, q, r = vectors[:n], vectors[n : 2 * n], vectors[2 * n : 2 * n + m]
+        slope = np.linalg.solve(np.eye(n) - closed.T, q - k.T @ r + closed.T @ cost_to_go @ c)
+        offset = np.linalg.solve(pressed, r + b.T @ (cost_to_go @ c + slope))
         return ocp.control_bounds.clip(-k @ np.asarray(x, dtype=float) - offset)
 
     return law
+
+
+def _endless(ocp: OCP, dt: float | None) -> OCP:
+    """Return one interval of the problem without its end and constraints, its signals at rest."""
+    now = tuple(
+        Parameter(entry.name, entry.symbol, np.asarray(entry.value)[0])
+        if isinstance(entry, Signal)
+        else entry
+        for entry in ocp.parameters
+    )
+    return replace(
+        ocp,
+        horizon=1 if dt is None else dt,
+        terminal_cost=0.0,
+        constraints=(),
+        state_bounds=Box(),
+        parameters=now,
+        guess=None,
+    )
 
 
 def instantaneous(
@@ -66,7 +109,7 @@ def instantaneous(
     that needs no solver; state and path constraints it does not know.
 
     Args:
-        ocp: in continuous time; parameters and signals as it declares them, at their start.
+        ocp: in continuous time.
         reach: tau, how long the slope is believed in [s].
         sent: what the plant receives: the control, or the rate of the state, see ``Applied``.
 
@@ -83,11 +126,13 @@ def instantaneous(
     slope = ca.Function(
         "slope", [m.x, m.u, m.t, ocp.p], [ca.densify(ca.gradient(ca.SX(ocp.running_cost), m.x))]
     )
-    p = ocp.parameter_values().at(0.0)[0]
+    declared = ocp.parameter_values().at(0.0)[0]
 
-    def law(x: np.ndarray, t: float) -> np.ndarray:
-        state = numbers(x, m.nx, f"{ocp.name}: x")
-        u = control(state, reach * slope(state, u0, t, p), t, p)
-        return np.array(u if sent == "control" else ocp.functions.rate(state, u, t, p)).ravel()
+    def law(x: np.ndarray, t: float, p: np.ndarray | None = None) -> np.ndarray:
+        state, given = numbers(x, m.nx, f"{ocp.name}: x"), declared if p is None else p
+        u = control(state, reach * slope(state, u0, t, given), t, given)
+        if sent == "rate":
+            u = ocp.functions.rate(state, u, t, given)
+        return np.array(u).ravel()
 
     return law

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from ocp.errors import ProblemError, UnsupportedProblem
 from ocp.expressions import instance, positive
 from ocp.mpc.applied import Applied
-from ocp.mpc.asking import INSIDE, Rule
+from ocp.mpc.asking import INSIDE
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
+from ocp.mpc.fallback import Backup, Choice, backup_of
 from ocp.mpc.ladder import Ladder, Moment
 from ocp.mpc.loop import Watch, closed_loop
 from ocp.mpc.memory import Memory
@@ -56,7 +57,9 @@ class MPC:
             interpolated. For a discrete-time model it is that model's step. The input is held
             for dt: plans whose controls are held for less are applied only in their first part.
         applied: what the plant receives.
-        backup: (x, t) -> input (m,); default: hold the last input.
+        backup: (x, t) -> input (m,); ``"default"``: ``saturated_lqr`` where the problem is
+            linear-quadratic, ``instantaneous`` where it is that of a redundant arm, else
+            ``"hold"``: the last input; None: refuse. ``backup_law`` says which is in force.
         parameters: t -> parameters and signals of the horizon that starts there. If it raises,
             or what it returns does not fit, at the first step that is an error; later there
             is no new plan, and the last one is judged by the parameters it was made with.
@@ -71,8 +74,11 @@ class MPC:
         compiled: whether the solver, where it has such an option, and the model run as machine
             code. The first build takes seconds; see ``compiled``.
 
+    Attributes:
+        backup_law: the law in force, and why the problem suggests no other.
+
     Raises:
-        ProblemError: if interval, delay, budget or bounds do not fit the problem.
+        ProblemError: if interval, delay, budget, backup or bounds do not fit the problem.
         UnsupportedProblem: if the solver cannot treat it, its start is free (here it is
             measured), or its final time is.
     """
@@ -81,7 +87,7 @@ class MPC:
     solver: Solver
     dt: float
     applied: Applied = field(default_factory=Applied)
-    backup: Rule | None = None
+    backup: Choice = "default"
     parameters: Parameters | None = None
     guess: Start | None = None
     delay: float = 0.0
@@ -89,17 +95,19 @@ class MPC:
     budget: float | None = None
     tolerance: float = 1e-6
     compiled: bool = True
+    backup_law: Backup = field(init=False)
 
     def __post_init__(self) -> None:
         """Check the numbers, and do all symbolic work."""
         self._check()
+        self.backup_law = backup_of(self.backup, self.ocp, self.dt, self.applied)
         self.steps_late = late_steps(self.delay, self.dt)
         self.memory = Memory()
         self._ladder = Ladder(
             ocp=self.ocp,
             program=self._fastest.build(self.ocp),
             applied=self.applied,
-            backup=self.backup,
+            backup=self.backup_law,
             guess=self.guess,
             dt=self.dt,
             tolerance=self.tolerance,
@@ -228,7 +236,7 @@ class MPC:
             )
         values, why = self._informed(at, parameters)
         since = plan.t[0] if why and plan else at
-        is_measured = bool(np.isfinite(state).all())
+        is_measured = all(map(isfinite, state.tolist()))
         if not is_measured:  # without a plan the backup law sees what was measured
             state = state if plan is None else plan.state(at)
         elif self.compensate and self.memory.pending:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp.constraint import Box
-from ocp.mpc.applied import Applied
-from ocp.mpc.asking import INSIDE, Rule, asked
+from ocp.mpc.applied import Applied, Sending
+from ocp.mpc.asking import INSIDE, asked
 from ocp.mpc.decision import ControlRefused, Outcome
+from ocp.mpc.fallback import Answer, Backup
 from ocp.mpc.rehearsal import Ends, Rehearsal
 from ocp.mpc.shift import Shifted, controls
 from ocp.parameters import ParameterValues
@@ -89,7 +90,7 @@ class Ladder:
         program: solves it.
         applied: what the plant receives.
         guess: where the first step starts.
-        backup: the law of the last rung; None: hold the last input.
+        backup: the law of the last rung.
         dt: sampling interval [s].
         tolerance: what still counts as inside.
         compiled: whether the model runs as machine code.
@@ -99,7 +100,7 @@ class Ladder:
     program: Program
     applied: Applied
     guess: Start | None
-    backup: Rule | None
+    backup: Backup
     dt: float
     tolerance: float
     compiled: bool
@@ -147,21 +148,34 @@ class Ladder:
         return self._following(moment.plan, moment, Outcome.SHIFTED)
 
     def backed_up(self, moment: Moment, last: np.ndarray | None) -> Choice | None:
-        """Ask the backup law; without one hold the last input."""
-        given, needed = last, self.applied.size(self.ocp)
-        if self.backup is not None:
-            try:
-                given = asked(self.backup, "the backup law", moment.start, moment.at)
-            except ControlRefused as refusal:
-                moment.reasons.append(str(refusal))
-                return None
-        if given is None:
-            moment.reasons.append("there is no input to hold, and no backup law")
+        """Ask the backup law; where it holds and has no answer, hold the last input."""
+        choice = self._by_law(moment, self.backup.law) if self.backup.law else None
+        if choice or not self.backup.holds:
+            if self.backup.law is None:
+                moment.reasons.append("there is no backup law")
+            return choice
+        if last is None:
+            moment.reasons.append("there is no input to hold")
             return None
+        moment.reasons.append("backup: hold")
+        return self._within(moment, last, Outcome.BACKUP)
+
+    def _by_law(self, moment: Moment, law: Answer) -> Choice | None:
+        """Ask the backup law."""
+        p = self._parameters(moment, moment.at)
+        try:
+            given = asked(lambda x, t: law(x, t, p), "the backup law", moment.start, moment.at)
+        except ControlRefused as refusal:
+            moment.reasons.append(str(refusal))
+            return None
+        needed = self.applied.size(self.ocp)
         if len(given) != needed:
             moment.reasons.append(f"the backup law returned {len(given)} numbers, not {needed}")
             return None
-        return self._within(moment, given, Outcome.BACKUP)
+        choice = self._within(moment, given, Outcome.BACKUP)
+        if choice:
+            moment.reasons.append(f"backup: {self.backup.name}")
+        return choice
 
     def advanced(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the model's state one interval after t [s] under an input, parameters held."""
@@ -207,9 +221,7 @@ class Ladder:
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
         u = controls(plan, moment.at + middle)
-        given = self.applied.of(
-            self.ocp, moment.start, u, moment.at, self._parameters(moment, moment.at)
-        )
+        given = self._sending(moment.start, u, moment.at, self._parameters(moment, moment.at))
         return self._within(moment, given, outcome, plan)
 
     def _within(
@@ -217,8 +229,9 @@ class Ladder:
     ) -> Choice | None:
         """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
         inside = self.box.clip(given)
-        # Where an input is not finite, nor is this.
-        excess = float(np.abs(given - inside).max(initial=0.0))
+        moved = given - inside
+        # Where an input is not finite, nor is this: what is no number is not zero, either.
+        excess = float(np.abs(moved).max()) if np.count_nonzero(moved) else 0.0
         if not isfinite(excess):
             moment.reasons.append(f"the input {given} is not finite")
             return None
@@ -248,6 +261,11 @@ class Ladder:
         """Whether there is anything along the way that a plan could violate."""
         ocp = self.ocp
         return bool(ocp.at("path")) or ocp.state_bounds.is_active or ocp.control_bounds.is_active
+
+    @cached_property
+    def _sending(self) -> Sending:
+        """What makes an input of a state and a control."""
+        return self.applied.sending(self.ocp)
 
     @cached_property
     def box(self) -> Box:

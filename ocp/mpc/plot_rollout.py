@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from ocp.mpc.decision import Outcome
 from ocp.mpc.rollout import Rollout
 
-_COLOURS = {
+# Of the rungs.
+COLOURS = {
     Outcome.OPTIMAL: "#2f7fb8",
     Outcome.FEASIBLE: "#3aa98f",
     Outcome.SHIFTED: "#e8710a",
@@ -20,10 +21,10 @@ def plot_rollout(rollout: Rollout) -> Figure:
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     states, inputs, costs = figure.subplots(3, 1, sharex=True)
     model = rollout.plant.model
-    for name, column in zip(_labels(model.x_names, model.x_units), rollout.x.T, strict=True):
+    for name, column in zip(labels(model.x_names, model.x_units), rollout.x.T, strict=True):
         states.plot(rollout.t, column, label=name)
     edges = rollout.t[: len(rollout.inputs) + 1]
-    for name, column in zip(_labels(model.u_names, model.u_units), rollout.inputs.T, strict=True):
+    for name, column in zip(labels(model.u_names, model.u_units), rollout.inputs.T, strict=True):
         inputs.step(edges, np.append(column, column[-1:]), where="post", label=name)
     costs.step(edges[:-1], rollout.costs / np.diff(edges), where="post", color="black")
     for axes, label in ((states, "states"), (inputs, "inputs"), (costs, "running cost")):
@@ -43,7 +44,8 @@ def plot_rollout(rollout: Rollout) -> Figure:
     return figure
 
 
-def _labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
+def labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names with their units, where there are any."""
     return tuple(f"{n} [{u}]" for n, u in zip(names, units, strict=True)) if units else names
 
 
@@ -52,4 +54,4 @@ def _shade(axes: Axes, rollout: Rollout) -> None:
     for k, outcome in enumerate(rollout.outcomes):
         if outcome is not Outcome.OPTIMAL:
             left, right = rollout.t[k], rollout.t[k + 1]
-            axes.axvspan(left, right, color=_COLOURS[outcome], alpha=0.25, lw=0)
+            axes.axvspan(left, right, color=COLOURS[outcome], alpha=0.25, lw=0)

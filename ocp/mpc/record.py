@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from struct import Struct
+from struct import Struct, pack
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
@@ -104,10 +104,12 @@ def packed(measured: np.ndarray, step: Attempt, plan: Solution | None) -> bytes:
         arrays += (plan.t, plan.x, plan.x0, plan.costate, plan.u, plan.breaks)
     arrays += step.parameters.values()
     arrays = [np.asarray(array, dtype=float) for array in arrays]
-    pieces = [_SHAPE.pack(*array.shape, *(_VECTOR,) * (2 - array.ndim)) for array in arrays]
-    pieces += [array.tobytes() for array in arrays]
-    pieces.append(step.message.encode())
-    body = b"".join(pieces)
+    sizes = []
+    for array in arrays:
+        sizes += array.shape if array.ndim == 2 else (len(array), _VECTOR)
+    # As many as len(arrays) times _SHAPE, at once.
+    shapes = pack(f"<{len(sizes)}i", *sizes)
+    body = b"".join([shapes, *[array.tobytes() for array in arrays], step.message.encode()])
     head = _HEAD.pack(
         len(body),
         step.t,

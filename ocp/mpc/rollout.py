@@ -1,6 +1,7 @@
 """What happened in a closed loop."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,12 @@ from ocp.mpc.decision import Decision, Outcome
 from ocp.problem import OCP
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+# (axes, x (nx,), t [s]) -> the scene; (frames written, frames in all).
+Draw = Callable[["Axes", np.ndarray, float], object]
+Progress = Callable[[int, int], object]
 
 _OUTCOMES = tuple(Outcome)
 
@@ -79,6 +85,44 @@ class Rollout:
         from ocp.mpc.plot_rollout import plot_rollout  # matplotlib takes a second
 
         return plot_rollout(self)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        draw: Draw | None = None,
+        frames_per_second: int = 20,
+        speed: float = 1.0,
+        progress: Progress | None = None,
+    ) -> Path:
+        """Write the loop as an animated GIF; return its path.
+
+        States and inputs grow with time; ahead of now the plan that is followed is dashed, its
+        inputs only where what is sent are its controls. The title says the rung. A rollout
+        that was loaded has no plans.
+
+        Args:
+            path: with the suffix ``.gif``; its folder is made.
+            draw: (axes, x, t) draws the scene, on empty axes for every frame; x is interpolated
+                between the samples.
+            frames_per_second: 1 to 50.
+            speed: seconds of the loop in a second of the film.
+            progress: called with the number of frames written and of all frames.
+
+        Raises:
+            ProblemError: if there is nothing to show, there would be thousands of frames, or an
+                argument is out of its range.
+        """
+        from ocp.mpc.animate_rollout import animate_rollout  # matplotlib takes a second
+
+        return animate_rollout(
+            self,
+            path,
+            draw=draw,
+            frames_per_second=frames_per_second,
+            speed=speed,
+            progress=progress,
+        )
 
     def save(self, path: str | Path) -> Path:
         """Write everything but the plant and the plans to one ``.npz`` file; return its path."""

@@ -51,6 +51,9 @@ def controls(plan: Solution, times: np.ndarray | float) -> np.ndarray:
     control would have to be solved for.
     """
     if plan.control_kind == "held":
+        # A new plan is asked for its first control at every step: nothing to look for.
+        if isinstance(times, float) and times == plan.t[0]:
+            return plan.u[0]
         return plan.u[_interval(times + 1e-9 * plan.duration, plan.t)]
     if plan.control_kind == "polynomial":
         values = plan.pieces.at(np.atleast_1d(times))

@@ -144,10 +144,11 @@ def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:
     assert np.abs(rollout.x[-1]).max() < 0.2
 
 
-def test_without_a_backup_law_the_last_input_is_held() -> None:
+def test_where_that_is_the_choice_the_last_input_is_held() -> None:
     script = {round(k * DT, 2): becomes(Status.FAILED) for k in range(2, 30)}
-    rollout = loop(controller(script), 1.5)
+    rollout = loop(controller(script, backup="hold"), 1.5)
     assert set(rollout.outcomes[11:]) == {Outcome.BACKUP}
+    assert rollout.messages[-1].endswith("backup: hold")
     assert (rollout.inputs[11:] == rollout.inputs[10]).all()
 
 
@@ -178,7 +179,7 @@ def test_a_missing_measurement_is_no_state() -> None:
 
 
 def test_late_answers_are_kept_for_later() -> None:
-    mpc = controller()
+    mpc = controller(backup="hold")
     first = mpc.step([1.0, 0.0], 0.0)
     late = mpc.step([0.99, -0.2], DT, late=True)
     assert late.outcome is Outcome.SHIFTED
@@ -191,7 +192,7 @@ def test_late_answers_are_kept_for_later() -> None:
 
 
 def test_a_late_plan_outlives_the_refusal_of_its_step() -> None:
-    mpc = controller()
+    mpc = controller(backup="hold")
     with pytest.raises(ControlRefused, match="too late") as refused:
         mpc.step([1.0, 0.0], 0.0, late=True)
     attempt = refused.value.attempt

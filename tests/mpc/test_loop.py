@@ -228,7 +228,8 @@ def test_a_refusal_is_recorded_and_refused_again(tmp_path: Path) -> None:
     def fails(solution: Solution) -> Solution:
         return solution.with_(status=Status.FAILED, message="as the script says")
 
-    mpc, file = MPC(ocp=cart(), solver=scripted({0.1: fails}), dt=DT), tmp_path / "flight"
+    mpc = MPC(ocp=cart(), solver=scripted({0.1: fails}), dt=DT, backup="hold")
+    file = tmp_path / "flight"
     with FlightRecorder(mpc, file) as recorder:
         # A late plan outlives its own step, in the replay too: the third step follows it.
         for k, (x, late) in enumerate([([1.0, 0.0], True), ([np.nan, 0.0], False), (START, True)]):
