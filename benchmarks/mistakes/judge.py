@@ -38,11 +38,11 @@ class Verdict:
         return self.entry.symbol in first.where
 
 
-def judged(entries: Sequence[Mistake | Sound], *, intervals: int = 50) -> Iterator[Verdict]:
+def judged(entries: Sequence[Mistake | Sound]) -> Iterator[Verdict]:
     """Diagnose one problem after the other, each once."""
     for entry in entries:
         ocp, started = entry.build(), perf_counter()
-        diagnosis = diagnose(ocp, intervals=intervals)
+        diagnosis = diagnose(ocp)
         yield Verdict(entry, diagnosis, perf_counter() - started)
 
 
