@@ -13,7 +13,6 @@ from ocp import Box, Euler, ProblemError, solve
 from solvers import Cause, Diagnosis, Finding, MultipleShooting, Severity, diagnose, polish
 from tests.ocp.problems import energy, lag, pendulum
 
-
 # Where finding and plant differ, and the page says why.
 MISSED = (
     "weak rotors, far target",
