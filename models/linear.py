@@ -7,7 +7,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import signal
 
 from models._numbers import at_least, vector
 from ocp import Model, ProblemError
@@ -69,6 +68,8 @@ class LinearPlant:
             denominator: the same, of no lower degree.
             name: what people call it.
         """
+        from scipy import signal  # imports half of scipy: a second that few need
+
         try:
             parts: Any = signal.tf2ss(numerator, denominator)
         except ValueError as error:
@@ -81,6 +82,8 @@ class LinearPlant:
         at_least(dt, 0.0, f"{self.name}: dt", strictly=True)
         if self.dt is not None:
             raise ProblemError(f"{self.name}: sampled already, every {self.dt:g} s")
+        from scipy import signal  # as above
+
         sampled: Any = signal.cont2discrete((self.A, self.B, self.C, self.D), dt)
         a, b, c, d, _ = sampled
         names = {"x_names": self.x_names, "u_names": self.u_names}

@@ -142,8 +142,13 @@ class Solution:
         """Return one line: what was solved, how it ended, what the solver believes it costs."""
         return (
             f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
-            f"{self.iterations} iterations, {len(self.t) - 1} intervals>"
+            f"{self.iterations} iterations, {len(self.t) - 1} intervals{self._hint}>"
         )
+
+    @property
+    def _hint(self) -> str:
+        """Who knows more about a failure."""
+        return "" if self.status.is_success else "; solvers.diagnose(solution) looks for the cause"
 
     @property
     def duration(self) -> float:
@@ -163,7 +168,8 @@ class Solution:
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
         if not self.status.is_success:
-            raise SolverError(f"{self.solver}: {self.status.value}. {self.message}".strip())
+            said = f"{self.solver}: {self.status.value}. {self.message}".strip()
+            raise SolverError(f"{said}{self._hint}")
         return self
 
     def with_(self, **changes: Any) -> "Solution":

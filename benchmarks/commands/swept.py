@@ -8,8 +8,8 @@ from rich.console import Console
 from benchmarks.cases import Case
 from benchmarks.claims.every import below_reference, claims_of
 from benchmarks.methods.method import Method, Settings
+from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.executors import Execution
-from benchmarks.sweep.guard import SweepError
 from benchmarks.sweep.row import RESULTS, Row
 from benchmarks.sweep.sweep import sweep
 from benchmarks.sweep.task import tasks_of

@@ -64,13 +64,19 @@ def _polish(case: Case, settings: Settings) -> Outcome:
 
 
 def _cheapest_extremal(case: Case, settings: Settings) -> Outcome:
-    """The best of the extremals that a scan finds; nothing of it is random."""
+    """The best of the extremals that a scan finds, with the effort of all; nothing is random."""
     started = perf_counter()
-    found = enumerate_extremals(problem(case), keep=ROOTS).solutions
-    if not found:
+    found = enumerate_extremals(problem(case), keep=ROOTS)
+    effort = {
+        "solve_time": perf_counter() - started,
+        "iterations": found.iterations,
+        "work": found.work,
+    }
+    if not found.solutions:
         none = solve(problem(case), MultipleShooting(INTERVALS))
-        return judged(none.with_(status=Status.FAILED, message="the scan found no extremal"))
-    return judged(found[0].with_(solve_time=perf_counter() - started))
+        reason = "the scan found no extremal"
+        return judged(none.with_(status=Status.FAILED, message=reason, **effort))
+    return judged(found.solutions[0].with_(**effort))
 
 
 def _with_local_gap(solver: Solver) -> Callable[[Case, Settings], Outcome]:

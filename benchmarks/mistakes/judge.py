@@ -39,7 +39,7 @@ class Verdict:
 
 
 def judged(entries: Sequence[Mistake | Sound]) -> Iterator[Verdict]:
-    """Diagnose one problem after the other."""
+    """Diagnose one problem after the other, each once."""
     for entry in entries:
         ocp, started = entry.build(), perf_counter()
         diagnosis = diagnose(ocp)

@@ -55,8 +55,8 @@ def _violation(part: Part) -> Block:
     values = {m: [r.violation for r in part.of(m) if r.violation is not None] for m in part.methods}
     name = f"violation-{part.name}"
     limits = sorted({level.violation for level in LEVELS})
-    svg = strips(name, values, part.colours, "largest violation", *_VIOLATIONS, limits)
-    columns = ("method", "case", "starts", "seed", "violation", "of what")
+    svg = strips(name, values, part.colours, "violation [its own unit]", *_VIOLATIONS, limits)
+    columns = ("method", "case", "starts", "seed", "violation, in its unit", "of what")
     return Plot(
         name,
         f"{part.title}: largest violation of a constraint",

@@ -19,8 +19,8 @@ Curve = list[tuple[int, float]]
 _HOW = (
     "The median time of an iteration over the number of states n and over the intervals N of the "
     "grid, for methods whose rows in a suite have at least two different ones. The time of a "
-    "whole solve would mix in how many iterations a start needs. The exponent p is that of time ~ "
-    "size^p, by least squares of the logarithms; of two points it is no more than their slope. "
+    "whole solve would mix in how many iterations a start needs. The exponent p is that of time ∝ "
+    "sizeᵖ, by least squares of the logarithms; of two points it is no more than their slope. "
     "Only the suite “links” has problems that differ in nothing but their size."
 )
 

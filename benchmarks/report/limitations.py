@@ -11,9 +11,11 @@ _ALWAYS = (
     "Every method runs with the options listed above, nobody has tuned them for a case.",
     "Times are wall-clock times of single runs, beside whatever else the machine did. Iterations, "
     "integrations and factorisations do not depend on that.",
-    "A solve time leaves out building the problem. A method that begins where another ended "
-    "does not count the time of that one, and the best of several starts has its own time only.",
-    "Integrations are those that a method counts: “extremals” counts its last step, not its scan.",
+    "A solve time leaves out building the problem (not so for “extremals”). A method that "
+    "begins where another ended does not count the time of that one, and the best of several "
+    "starts has its own time only.",
+    "Integrations are those that a method counts itself. Each motion of the scan of “extremals” "
+    "is one; the second-order tests of “polish” and “extremals” and the referee are not counted.",
     "A gap is as good as its reference, and says nothing about a case without one. Stationarity, "
     "which is judged there, does not tell a minimum from another extremal.",
     "Performance profiles compare all methods at once: taking one away can change the order of "

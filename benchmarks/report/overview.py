@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from benchmarks.methods.every import all_methods
 from benchmarks.report.section import Block, Section, Text
 from benchmarks.report.sheet import Sheet
 from benchmarks.sweep.row import Row
@@ -55,5 +56,8 @@ def _listed(numbers: set[int]) -> str:
 
 
 def _methods(rows: Sequence[Row]) -> Sheet:
+    """What each is, and where it begins: what another method did before is not in its time."""
+    about = {method.name: method.about for method in all_methods()}
     options = dict.fromkeys((row.solver, row.settings) for row in rows)
-    return Sheet("methods", ("method", "its options"), list(options), folded=True)
+    lines = [(name, about.get(name), settings) for name, settings in options]
+    return Sheet("methods", ("method", "in short", "its options"), lines, folded=True)

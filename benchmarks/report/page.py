@@ -11,6 +11,7 @@ from benchmarks.report.growth import growth
 from benchmarks.report.level import LEVELS
 from benchmarks.report.limitations import limitations
 from benchmarks.report.overview import overview
+from benchmarks.report.plot import power_of_ten
 from benchmarks.report.profiles import profiles
 from benchmarks.report.reaching import reaching
 from benchmarks.report.section import Section
@@ -53,11 +54,13 @@ def report_page(rows: Sequence[Row], notes: Sequence[str], title: str) -> str:
 
 def _facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     """What to know first: (number, what it counts)."""
-    solved = [(share(level, rows), level.name) for level in LEVELS]
+    solved = [
+        (share(level, rows), f"gap\u00a0≤\u00a0{power_of_ten(level.gap)}") for level in LEVELS
+    ]
     return [
         (str(len(rows)), "rows"),
         (str(len({(row.suite, row.case) for row in rows})), "cases"),
         (str(len({row.solver for row in rows})), "methods"),
-        *((f"{one:.0f} %" if one is not None else "–", f"meet “{name}”") for one, name in solved),
+        *((f"{one:.0f} %" if one is not None else "–", f"solved, {name}") for one, name in solved),
         (str(sum(row.is_lost for row in rows)), "lost"),
     ]

@@ -114,7 +114,8 @@ def powers_of_ten(axis: Axis) -> None:
     # Where hardly two powers of ten are in view, other numbers help.
     between = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)
     axis.set_major_locator(LogLocator(subs=between))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    named = power_of_ten if len(between) == 1 else "{:g}".format
+    axis.set_major_formatter(FuncFormatter(lambda value, _: named(value)))
     axis.set_minor_formatter(NullFormatter())
 
 

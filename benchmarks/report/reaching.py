@@ -3,18 +3,21 @@
 from collections.abc import Sequence
 
 from benchmarks.report.level import LEVELS, Level
-from benchmarks.report.plot import Plot
+from benchmarks.report.plot import Plot, power_of_ten
 from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
 from benchmarks.report.steps import staircases
 from benchmarks.sweep.row import Row
 
 _HOW = (
-    "The share of a method's rows that end within a gap of the reference, over the time that "
-    "their solve took as a whole (without building; rows keep no times in between). A curve that "
-    "ends below 100\u00a0% has cases that the method does not bring that far. Times are of these "
-    "machines, and of a solve alone: what a method that begins where another ended owes to that "
-    "one is not in its time."
+    "The share of a method's rows that end within a gap of the reference (in the legend: of all "
+    "of them), over the time that "
+    "their solve took as a whole: to its own tolerance, not to this gap, which it may have passed "
+    "long before. Rows keep no times in between, so this is the most that the gap costs, and "
+    "says as much about when a method stops. A curve that ends below 100\u00a0% has cases that "
+    "the method does not bring that far. A time is that of these machines and of a solve alone: "
+    "without building the problem, without the solve of another method that it begins with (see "
+    "the methods above), and of the best of several starts only."
 )
 
 
@@ -38,6 +41,6 @@ def _plot(part: Part, level: Level) -> Plot:
         if rows
     }
     totals = {m: len(rows) for m, rows in judged.items()}
-    title = f"{part.title}: within {level.gap:g} of the reference"
+    title = f"{part.title}: within {power_of_ten(level.gap)} of the reference"
     name = f"time-{part.name}-{level.name}"
     return staircases(name, title, reached, totals, part.colours, axis="solve time [s]")

@@ -52,7 +52,9 @@ def staircases(
 
     lines = [(m, a, b) for m, (x, y) in steps.items() for a, b in zip(x, y, strict=True)]
     data = Sheet(name, ("method", axis, "share [%]"), lines, folded=True)
-    legend = [Legend(method, colours[method]) for method in reached]
+    # Lines that lie on each other can be told apart by where they end.
+    ends = {m: y[-1] if y else 0.0 for m, (_, y) in steps.items()}
+    legend = [Legend(f"{m} {ends[m]:.0f}\u00a0%", colours[m]) for m in reached]
     return Plot(name, title, drawn(name, _HEIGHT, draw), data, legend)
 
 

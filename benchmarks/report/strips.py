@@ -53,7 +53,7 @@ def strips(
         named_ticks(axes.yaxis, list(values))
         axes.set_ylim(len(values) - 0.4, -0.6)
         right = f", right: ≥ {power_of_ten(ceiling)}" if largest > ceiling else ""
-        axes.set_xlabel(f"{axis}; at the left edge: ≤ {power_of_ten(floor)}{right}")
+        axes.set_xlabel(f"{axis}; left edge: ≤ {power_of_ten(floor)}{right}")
 
     return drawn(name, 0.9 + 0.29 * len(values), draw)
 

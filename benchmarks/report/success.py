@@ -27,7 +27,12 @@ def success(rows: Sequence[Row]) -> Section:
 
 
 def _thresholds() -> Sheet:
-    columns = ("level", "violation ≤", "|gap| ≤ (relative)", "else stationarity ≤")
+    columns = (
+        "level",
+        "violation ≤ [its unit]",
+        "|gap| ≤, relative",
+        "else stationarity ≤ [unit of u]",
+    )
     lines = [(level.name, level.violation, level.gap, level.stationarity) for level in LEVELS]
     return Sheet("levels", columns, lines)
 

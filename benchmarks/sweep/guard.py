@@ -7,19 +7,16 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import IO
 
 from benchmarks.sweep.child import READY
+from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
 from benchmarks.sweep.task import Task
 
 _LONGEST = 300  # characters of a message
-
-
-class SweepError(Exception):
-    """What ends a sweep, not a row: no process starts, no scheduler answers."""
 
 
 @dataclass(frozen=True)
@@ -37,22 +34,28 @@ class Group:
     module: str = "benchmarks.sweep.child"
 
 
-def run_group(group: Group) -> list[Row]:
+def run_group(group: Group, tell: Callable[[Row], object] = lambda row: None) -> list[Row]:
     """Return a row for each task, in their order.
 
     A task whose process ends is lost, with the reason; the tasks after it get a new process.
+
+    Args:
+        group: what to compute.
+        tell: is called with every row as soon as it is there.
 
     Raises:
         SweepError: if no process can be started, or it is interrupted from the keyboard.
     """
     rows: list[Row] = []
     while len(rows) < len(group.tasks):
-        rows += _one_process(group, group.tasks[len(rows) :])
+        for row in _one_process(group, group.tasks[len(rows) :]):
+            tell(row)
+            rows.append(row)
     return rows
 
 
-def _one_process(group: Group, tasks: Sequence[Task]) -> list[Row]:
-    """Return the rows that one process has computed, and the row that it did not survive."""
+def _one_process(group: Group, tasks: Sequence[Task]) -> Iterator[Row]:
+    """Yield the rows that one process computes, at last the row that it did not survive."""
     with tempfile.TemporaryFile() as errors:
         process = _start(group.module, errors)
         assert process.stdin is not None
@@ -61,21 +64,19 @@ def _one_process(group: Group, tasks: Sequence[Task]) -> list[Row]:
             order = {"limit": group.limit, "tasks": [asdict(task) for task in tasks]}
             _send(process.stdin, json.dumps(order))
             begun = process.stdout.readline() == READY
-            last = time.monotonic()
-            rows = []
+            last, number = time.monotonic(), 0
             for line in process.stdout:
                 if line.endswith("\n"):  # else it ended while it wrote
-                    rows.append(Row.parse(line))
-                    last = time.monotonic()
+                    yield Row.parse(line)
+                    last, number = time.monotonic(), number + 1
         elapsed = time.monotonic() - last
         if process.returncode == -signal.SIGINT:
             raise SweepError("interrupted")
         if not begun:
             raise SweepError(f"no process could be started: {_last_line(errors)}")
-        if len(rows) < len(tasks):
+        if number < len(tasks):
             status, message = _reason(process.returncode, group.limit, errors)
-            rows.append(Row.lost(tasks[len(rows)], status, message, elapsed))
-        return rows
+            yield Row.lost(tasks[number], status, message, elapsed)
 
 
 def _start(module: str, errors: IO[bytes]) -> subprocess.Popen[str]:

@@ -1,16 +1,17 @@
 """Runs cases by methods in parallel, one line of results at a time, resumable."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
+from contextlib import closing
 from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.sweep.executors import Execution
-from benchmarks.sweep.guard import Group, run_group
+from benchmarks.sweep.guard import Group
+from benchmarks.sweep.lock import locked
 from benchmarks.sweep.row import RESULTS, Row, versions
 from benchmarks.sweep.rows_file import prepare, read_rows
-from benchmarks.sweep.task import Task, groups_of
+from benchmarks.sweep.task import Key, Task, groups_of
 
 
 def sweep(
@@ -23,7 +24,7 @@ def sweep(
     progress: bool = True,
     say: Callable[[str], object] = lambda note: None,
 ) -> tuple[Row, ...]:
-    """Run tasks and return their rows; a group's are appended to a file when it is ready.
+    """Run tasks and return their rows; each is appended to a file as soon as it is there.
 
     Nobody but this process writes the file. It can be killed at any moment: what it has written is
     whole, what it has not is computed again.
@@ -38,41 +39,44 @@ def sweep(
         say: is called with a sentence about everything in the folder that cannot be used.
 
     Raises:
-        SweepError: if there are no workers, or they went away; the rows so far are kept.
+        SweepError: if there are no workers, or they went away, the rows so far are kept; or if
+            another sweep writes to the folder.
     """
     out.mkdir(parents=True, exist_ok=True)
-    file = out / RESULTS
-    for note in prepare(file):
-        say(note)
-    execution = execution or Execution()
-    wanted = {task.key: task for task in tasks}
-    done = {row.key for row in read_rows(file) if not (retry and row.is_lost)} if resume else set()
-    todo = [task for key, task in wanted.items() if key not in done]
-    groups = [Group(group, execution.limit) for group in groups_of(todo)]
-    with _bar(progress) as bar:
-        line = bar.add_task("benchmarks", total=len(wanted), completed=len(wanted) - len(todo))
-        if groups:
-            with execution.open() as executor:
-                _collect(executor, groups, file, lambda rows: bar.advance(line, rows), say)
-    rows = {row.key: row for row in read_rows(file)}
+    file, wanted = out / RESULTS, {task.key: task for task in tasks}
+    with locked(out):
+        for note in prepare(file):
+            say(note)
+        done = _done(file, retry) if resume else set()
+        todo = [task for key, task in wanted.items() if key not in done]
+        with _bar(progress) as bar:
+            line = bar.add_task("benchmarks", total=len(wanted), completed=len(wanted) - len(todo))
+            _compute(todo, execution or Execution(), file, lambda: bar.advance(line), say)
+        rows = {row.key: row for row in read_rows(file)}
     return tuple(rows[key] for key in wanted if key in rows)
 
 
-def _collect(
-    executor: Executor,
-    groups: Sequence[Group],
+def _done(file: Path, retry: bool) -> set[Key]:
+    return {row.key for row in read_rows(file) if not (retry and row.is_lost)}
+
+
+def _compute(
+    todo: Sequence[Task],
+    execution: Execution,
     file: Path,
-    advance: Callable[[int], None],
+    advance: Callable[[], object],
     say: Callable[[str], object],
 ) -> None:
-    """Send all groups and write what comes back."""
+    """Compute the tasks and write every row as it comes."""
+    groups = [Group(group, execution.limit) for group in groups_of(todo)]
+    if not groups:
+        return
     others = set()
-    for future in as_completed([executor.submit(run_group, group) for group in groups]):
-        rows = future.result()
+    with closing(execution.rows(groups)) as rows:
         for row in rows:
             row.append_to(file)
-        advance(len(rows))
-        others |= {str(row.versions) for row in rows if row.versions != versions()}
+            advance()
+            others |= {str(row.versions)} if row.versions != versions() else set()
     for other in sorted(others):
         say(f"workers with other versions have computed rows: {other}; here {versions()}")
 

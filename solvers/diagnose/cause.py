@@ -24,7 +24,7 @@ class Cause(Enum):
     VANISHING_TIME = "the free final time shrinks to nothing"
     ENDLESS_TIME = "the free final time grows without end"
     UNBOUNDED = "the cost falls without limit"
-    OUT_OF_REACH = "the end cannot be reached in time within the bounds of the controls"
+    OUT_OF_REACH = "the end cannot be reached in time within the bounds"
     CONFLICT = "constraints exclude each other along the whole trajectory"
     DUPLICATE = "constraints say the same thing twice"
     COARSE_GRID = "the dynamics are faster than the grid"

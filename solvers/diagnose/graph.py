@@ -18,10 +18,20 @@ def symbols(ocp: OCP) -> dict[int, str]:
     return {e.element_hash(): name for e, name in named}
 
 
-def appearing(ocp: OCP, expression: ca.SX) -> tuple[str, ...]:
-    """Return the names of the symbols in an expression, each once."""
-    known = symbols(ocp)
-    found = [known.get(s.element_hash(), str(s)) for s in ca.symvar(expression)]
+def appearing(ocp: OCP, expression: ca.SX, *, written: bool = False) -> tuple[str, ...]:
+    """Return the names of the symbols in an expression, each once.
+
+    Args:
+        ocp: the problem.
+        expression: of it.
+        written: after the name of a parameter or signal also that of its symbol, which is what
+            the expression shows.
+    """
+    known, found = symbols(ocp), []
+    for symbol in ca.symvar(expression):
+        found.append(known.get(symbol.element_hash(), str(symbol)))
+        if written:
+            found.append(str(symbol))
     return tuple(dict.fromkeys(found))
 
 

@@ -1,9 +1,11 @@
 """Dynamics that are faster than the steps of the grid."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import eig
 
 from ocp import evaluate
 from solvers.diagnose.cause import Cause
@@ -12,10 +14,12 @@ from solvers.diagnose.subject import Subject
 
 # RK4 is stable for eigenvalues up to here, times the step [Hairer & Wanner 1996, IV.2].
 _STABLE = 2.78
-# Far beyond it: no solve is needed to know.
+# Far beyond it: no solve is needed to know, and none would mean anything.
 _HOPELESS = 20.0
 # The referee's states may differ from the solver's by this, relative to 1 + abs(x).
 _DEFECT = 1e-2
+# A state with this share of the largest takes part in a motion.
+_TAKES_PART = 0.1
 
 
 def grid(subject: Subject) -> Iterator[Finding]:
@@ -28,18 +32,18 @@ def grid(subject: Subject) -> Iterator[Finding]:
     finite = np.isfinite(slopes).all(axis=(1, 2))
     if not finite.any():
         return
-    values, vectors = np.linalg.eig(slopes[finite])
+    values = np.linalg.eigvals(slopes[finite])
     k, i = np.unravel_index(int(np.abs(values).argmax()), values.shape)
     n = subject.program.transcription.n
     fastest, h = float(np.abs(values[k, i])), ocp.duration / n / subject.solver.integrator.steps
     if fastest * h <= _STABLE:
         return
     hopeless = fastest * h > _HOPELESS
-    names = _fast(m.x_names, vectors[k][:, i])
+    names = _fast(m.x_names, slopes[finite][k], fastest)
     needed = int(np.ceil(fastest * ocp.duration / _STABLE))
     yield Finding(
         Cause.COARSE_GRID,
-        Severity.WARNING if hopeless else Severity.ADVICE,
+        Severity.ERROR if hopeless else Severity.ADVICE,
         names,
         f"The fastest motion, in {', '.join(names)}, has a time constant of {1 / fastest:.2g} s, "
         f"the step is {h:.2g} s ({fastest * h:.3g} time constants; RK4 is stable up to {_STABLE}). "
@@ -50,10 +54,18 @@ def grid(subject: Subject) -> Iterator[Finding]:
     )
 
 
-def _fast(names: tuple[str, ...], vector: np.ndarray) -> tuple[str, ...]:
-    share = np.abs(vector) / np.abs(vector).max()
-    order = np.argsort(-share)
-    return tuple(names[i] for i in order if share[i] > 0.1)
+def _fast(names: tuple[str, ...], slope: np.ndarray, fastest: float) -> tuple[str, ...]:
+    """Return the states that take part in the fastest motion, most of all first.
+
+    By the products of left and right eigenvectors, which no choice of units changes
+    [Perez-Arriaga, Verghese & Schweppe 1982].
+    """
+    found: Any = eig(slope, left=True)
+    values, left, right = found
+    mode = int(np.abs(np.abs(values) - fastest).argmin())
+    share = np.abs(left[:, mode] * right[:, mode])
+    share /= share.max()
+    return tuple(names[i] for i in np.argsort(-share, kind="stable") if share[i] > _TAKES_PART)
 
 
 def referee(subject: Subject) -> Iterator[Finding]:

@@ -57,10 +57,13 @@ def _asks(subject: Subject) -> bool:
 
 
 def _time_may_help(subject: Subject, elastic: Elastic, members: tuple[int, ...]) -> bool:
-    ocp = subject.ocp
-    limited = any(elastic.demands[i].is_control for i in members)
-    signals = any(isinstance(entry, Signal) for entry in ocp.parameters)
-    return limited and not signals and bool(ocp.at("terminal"))
+    """Where an end takes part: what stands in its way may be a control, or a speed limit.
+
+    A signal is given over the horizon as it is.
+    """
+    ends = {c.name for c in subject.ocp.at("terminal")}
+    signals = any(isinstance(entry, Signal) for entry in subject.ocp.parameters)
+    return not signals and any(ends & set(elastic.demands[i].where) for i in members)
 
 
 def _shortest(subject: Subject) -> float | None:

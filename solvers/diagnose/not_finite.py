@@ -67,7 +67,8 @@ def _finding(subject: Subject, what: str, expression: ca.SX, point: Points) -> F
             return Finding(
                 Cause.NOT_FINITE,
                 Severity.ERROR,
-                appearing(subject.ocp, argument) or appearing(subject.ocp, expression),
+                appearing(subject.ocp, argument, written=True)
+                or appearing(subject.ocp, expression),
                 f"In {what}, {called} {shown(argument)} = {value:.3g}: the value or its derivative "
                 f"is no number there. The argument must {rule}: start or guess elsewhere, bound "
                 "the state away from it, or add a small constant inside.",

@@ -1,20 +1,45 @@
 """Quantities and weights of very different size."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 
 from solvers.diagnose.cause import Cause
+from solvers.diagnose.conditioning import Conditioning, conditioning
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import Subject
 
 # Beyond these ratios an interior-point method loses its digits.
 _SIZES, _WEIGHTS = 1e5, 1e10
+# A Newton step with such a matrix has few digits left; scaling is to blame for that much of it.
+_CONDITION, _GAIN = 1e13, 1e8
 
 
 def scaling(subject: Subject) -> Iterator[Finding]:
-    """Compare the sizes of states and controls, and what a typical step of each costs."""
+    """Compare sizes, what a typical step costs, and the KKT matrix before and after balancing."""
+    found, known = list(_sizes_and_weights(subject)), conditioning(subject)
+    if known is not None:
+        said = [replace(f, sentence=f"{f.sentence} {known}") for f in found]
+        found = said or list(_badly_conditioned(known))
+    yield from found
+
+
+def _badly_conditioned(known: Conditioning) -> Iterator[Finding]:
+    """What sizes and weights did not show, such as dynamics with very different coefficients."""
+    if known.raw > _CONDITION and known.gain > _GAIN:
+        yield Finding(
+            Cause.BAD_SCALING,
+            Severity.WARNING,
+            tuple(dict.fromkeys((known.large, known.small))),
+            f"{known} Choose units, or weights, in which a typical {known.large} and a typical "
+            f"{known.small} move cost and constraints equally.",
+            known.raw,
+        )
+
+
+def _sizes_and_weights(subject: Subject) -> Iterator[Finding]:
     m = subject.ocp.model
     names, sizes = (*m.x_names, *m.u_names), _sizes(subject)
     large, small = int(sizes.argmax()), int(sizes.argmin())

@@ -36,6 +36,17 @@ def time_kind(subject: Subject) -> Iterator[Finding]:
             "Leave dt out, or write x + dt * f or discretise(...).",
             float(typical.max()),
         )
+    if m.is_discrete and m.nx == 1 and (diagonal < 0.0).all():
+        yield Finding(
+            Cause.TIME_KIND,
+            Severity.WARNING,
+            m.x_names,
+            f"The model has dt = {m.dt} s, so f must be the next state; but it falls as "
+            f"{m.x_names[0]} grows (df/dx is at most {diagonal.max():.2g}), which no sampled "
+            "differential equation in one state does, since its solutions cannot cross: f looks "
+            "like dx/dt. Leave dt out, or write x + dt * f or discretise(...).",
+            float(diagonal.max()),
+        )
     if not m.is_discrete and np.abs(typical - 1.0).max() <= _NEAR and rest <= _STEP:
         yield Finding(
             Cause.TIME_KIND,

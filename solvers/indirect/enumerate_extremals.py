@@ -15,6 +15,7 @@ from ocp import (
     Solution,
     Status,
     UnsupportedProblem,
+    Work,
     evaluate,
     whole,
 )
@@ -22,7 +23,7 @@ from solvers.indirect.boundary import refuse_what_reverse_cannot
 from solvers.indirect.crossings import Condition, Crossings, is_transversal, meets_start
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.manifold import Kept, Manifold, redundant_by_one
-from solvers.indirect.reverse import Reverse
+from solvers.indirect.reverse import Reverse, Starts
 from solvers.indirect.scan import Scan, Scanner
 from solvers.indirect.segments import Schedule
 from solvers.indirect.self_motion import seeds_around, self_motions
@@ -50,6 +51,8 @@ class Enumeration:
         unresolved: jumps between neighbouring starts that the points did not suffice for: an
             extremal may hide in each.
         lost: roots of the scan that Newton, with finer steps, did not confirm.
+        iterations: of Newton, on all roots.
+        work: of scan and Newton; each motion integrated back from a point is a roll-out.
     """
 
     solutions: tuple[Solution, ...]
@@ -57,6 +60,8 @@ class Enumeration:
     scans: tuple[Scan, ...]
     unresolved: int
     lost: int
+    iterations: int
+    work: Work
 
     @property
     def minima(self) -> tuple[Solution, ...]:
@@ -112,8 +117,9 @@ def enumerate_extremals(
     data = Data.of(ocp, x0, t0, parameters)
     schedule, reverse = Schedule.of(ocp, data, _STEPS), Reverse.of(ocp, _STEPS, RK4())
     start, end = kept.at(t0, schedule.p_first), kept.at(t0 + schedule.duration, schedule.p_last)
+    motions = _Motions(reverse, schedule)
     scanner = Scanner(
-        integrate=lambda ends: reverse.starts(ends, schedule),
+        integrate=motions.starts,
         astray=lambda x: np.abs(start.linearised(x)[0]).max(axis=1),
         gap=gap,
         most=points,
@@ -123,7 +129,7 @@ def enumerate_extremals(
     roots = [crossings.on(scan) for scan in scans]
     costs = np.concatenate([root.costs for root in roots])
     ends = np.vstack([root.ends for root in roots])[np.argsort(costs, kind="stable")[:keep]]
-    guesses = [_guess(reverse, schedule, start, row, data.x0) for row in ends]
+    guesses = [_guess(motions, start, row, data.x0) for row in ends]
     solver = solver or IndirectShooting(_SEGMENTS, _FINE_STEPS, max_steps=_NEWTON_STEPS)
     found = list(_exact(solver.build(ocp), data, guesses))
     return _enumeration(found, scans)
@@ -140,6 +146,8 @@ def _enumeration(found: list[Solution], scans: tuple[Scan, ...]) -> Enumeration:
         scans=scans,
         unresolved=sum(scan.unresolved for scan in scans),
         lost=sum(not solution.status.is_success for solution in found),
+        iterations=sum(solution.iterations for solution in found),
+        work=sum((solution.work for solution in found), Work(rollouts=motions.number)),
     )
 
 
@@ -161,11 +169,34 @@ def _condition(ocp: OCP, start: Manifold, x0: np.ndarray, radius: float) -> Cond
     return meets_start(start, x0, radius)
 
 
-def _guess(
-    reverse: Reverse, schedule: Schedule, start: Manifold, end: np.ndarray, x0: np.ndarray
-) -> Guess:
+@dataclass
+class _Motions:
+    """Integrates back from the end, and counts how often.
+
+    Attributes:
+        reverse: the flow.
+        schedule: over which horizon.
+        number: motions so far.
+    """
+
+    reverse: Reverse
+    schedule: Schedule
+    number: int = 0
+
+    def starts(self, ends: np.ndarray) -> Starts:
+        """Return where the motions that end there start."""
+        self.number += len(ends)
+        return self.reverse.starts(ends, self.schedule)
+
+    def nodes(self, end: np.ndarray) -> np.ndarray:
+        """Return states and costates of one motion, from its start."""
+        self.number += 1
+        return self.reverse.path(end, self.schedule).nodes[::-1]
+
+
+def _guess(motions: _Motions, start: Manifold, end: np.ndarray, x0: np.ndarray) -> Guess:
     """Return the motion that ends at ``end``, turned back so that it begins near x0."""
-    z = reverse.path(end, schedule).nodes[::-1]
+    z = motions.nodes(end)
     x, costate = np.split(z, 2, axis=1)
     return Guess(x=x - start.periods.turns(x[0] - x0), costate=costate)
 

@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter
 
 from ocp import ProblemError
 from solvers.predictive.diophantine import Split, added, delayed, diophantine
@@ -135,6 +134,8 @@ class Prediction:
 
     def _filtered(self, outputs: ArrayLike, inputs: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """y(t), y(t-1), ... and Du(t) = 0, Du(t-1), ..., both divided by C."""
+        from scipy.signal import lfilter  # imports half of scipy: a second that few need
+
         y, u = history(outputs, "outputs"), history(inputs, "inputs")
         c = np.asarray(self.model.c, dtype=float)
         longest = len(self.difference) + len(c) + self.n2

@@ -1,13 +1,14 @@
 """The same sweep on a Dask cluster, and what is said where there is none."""
 
-import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 from benchmarks.__main__ import main
+from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.executors import Execution
-from benchmarks.sweep.guard import SweepError
+from benchmarks.sweep.guard import Group
 from benchmarks.sweep.row import RESULTS
 from benchmarks.sweep.rows_file import read_rows
 from benchmarks.sweep.sweep import sweep
@@ -17,6 +18,11 @@ distributed = pytest.importorskip("distributed")
 # Nobody listens there: port 9 is that of a service which is no longer used.
 NOBODY = "tcp://127.0.0.1:9"
 DASHBOARD = "127.0.0.1:0"  # any free port
+HANGING = Group(
+    tuple(replace(SMALL[0], method=name) for name in ("good", "hangs")),
+    60.0,
+    "tests.benchmarks.faulty_child",
+)
 
 
 @pytest.fixture(scope="module")
@@ -54,16 +60,12 @@ def test_a_scheduler_that_goes_away_ends_the_sweep_not_the_rows(tmp_path):
         n_workers=1, threads_per_worker=1, dashboard_address=DASHBOARD
     ) as cluster:
         execution = Execution(scheduler=cluster.scheduler_address)
-        with pytest.raises(SweepError, match="has gone"):
-            _lose(execution, cluster)
-
-
-def _lose(execution: Execution, cluster) -> None:
-    with execution.open() as executor:
-        assert executor.submit(sum, [1, 2]).result(timeout=30) == 3
-        waiting = executor.submit(time.sleep, 30.0)
+        rows = execution.rows([HANGING])
+        # As an event: the group that it belongs to has not ended, and never will.
+        assert next(rows).solved
         cluster.close()
-        waiting.result(timeout=60)
+        with pytest.raises(SweepError, match="has gone"):
+            next(rows)
 
 
 @pytest.mark.slow

@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks.methods.method import Settings
-from benchmarks.sweep.guard import Group, SweepError, run_group
+from benchmarks.sweep.error import SweepError
+from benchmarks.sweep.guard import Group, run_group
 from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
 from benchmarks.sweep.task import Task
 from tests.benchmarks.test_sweep import QUICK

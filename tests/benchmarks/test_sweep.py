@@ -6,16 +6,20 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.cases import all_cases, arm_cases
 from benchmarks.methods.every import all_methods
 from benchmarks.methods.method import Settings
+from benchmarks.sweep.error import SweepError
+from benchmarks.sweep.guard import Group, run_group
 from benchmarks.sweep.row import CRASHED, RESULTS, Row
 from benchmarks.sweep.rows_file import read_rows
 from benchmarks.sweep.sweep import sweep
@@ -34,45 +38,53 @@ def chosen(case_names, method_names):
 
 
 QUICK = next(case for case in all_cases() if case.name == "double-integrator-energy")
-# The first two methods that it declares.
-DIRECT = [m.name for m in all_methods() if m.family == "direct" and QUICK.suite in m.suites][:2]
+# The first three methods that it declares.
+DIRECT = [m.name for m in all_methods() if m.family == "direct" and QUICK.suite in m.suites][:3]
 SMALL = chosen({QUICK.name}, DIRECT)
 
 
-def test_a_row_has_what_the_readme_promises(tmp_path):
-    rows = sweep(SMALL, tmp_path, resume=False, progress=False)
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory) -> Path:
+    """A folder with the finished sweep of the small tasks."""
+    folder = tmp_path_factory.mktemp("swept")
+    sweep(SMALL, folder, resume=False, progress=False)
+    return folder
+
+
+def first_line(swept: Path, folder: Path, then: str = "") -> Path:
+    """Begin a file with the first row of a sweep."""
+    file = folder / RESULTS
+    file.write_text((swept / RESULTS).read_text().splitlines(keepends=True)[0] + then)
+    return file
+
+
+def test_a_row_has_what_the_readme_promises(swept):
+    rows = sweep(SMALL, swept, resume=True, progress=False)
     assert [(row.case, row.solver) for row in rows] == [(t.case, t.method) for t in SMALL]
     assert all(row.solved and row.optimum for row in rows)
-    lines = (tmp_path / RESULTS).read_text().splitlines()
+    lines = (swept / RESULTS).read_text().splitlines()
     assert len(lines) == len(SMALL)
     assert all(set(json.loads(line)) >= PROMISED for line in lines)
 
 
-def test_resume_recomputes_nothing_that_is_there(tmp_path):
-    sweep(SMALL[:1], tmp_path, resume=False, progress=False)
-    before = (tmp_path / RESULTS).read_text()
-    rows = sweep(SMALL, tmp_path, resume=True, progress=False)
-    after = (tmp_path / RESULTS).read_text()
-    assert after.startswith(before)
-    assert len(after.splitlines()) == len(rows) == len(SMALL)
-
-
-def test_without_resume_rows_are_computed_again_and_the_newest_counts(tmp_path):
-    sweep(SMALL[:1], tmp_path, resume=False, progress=False)
-    rows = sweep(SMALL[:1], tmp_path, resume=False, progress=False)
-    assert len((tmp_path / RESULTS).read_text().splitlines()) == 2
-    assert len(rows) == 1
-
-
-def test_a_damaged_line_costs_that_row_only(tmp_path):
-    sweep(SMALL[:1], tmp_path, resume=False, progress=False)
-    file = tmp_path / RESULTS
-    file.write_text(file.read_text() + '{"suite": "textbook", "ca')
-    said = []
+def test_resume_recomputes_nothing_and_a_damaged_line_costs_its_row_only(tmp_path, swept):
+    file = first_line(swept, tmp_path, '{"suite": "textbook", "ca')
+    before, said = file.read_text(), []
     rows = sweep(SMALL, tmp_path, resume=True, progress=False, say=said.append)
+    assert file.read_text().startswith(before)
     assert len(said) == 1
     assert "line 2" in said[0]
-    assert len(rows) == len(read_rows(file)) == 2
+    assert len(rows) == len(read_rows(file)) == len(SMALL)
+    assert len(file.read_text().splitlines()) == len(SMALL) + 1
+
+
+def test_without_resume_rows_are_computed_again_and_the_newest_counts(tmp_path, swept):
+    file = first_line(swept, tmp_path)
+    (old,) = read_rows(file)
+    (row,) = sweep(SMALL[:1], tmp_path, resume=False, progress=False)
+    assert len(file.read_text().splitlines()) == 2
+    assert read_rows(file) == (row,)
+    assert row != old
 
 
 def test_what_was_lost_is_computed_again_only_where_asked(tmp_path):
@@ -83,20 +95,67 @@ def test_what_was_lost_is_computed_again_only_where_asked(tmp_path):
     assert row.solved
 
 
+def test_a_row_is_written_before_the_next_is_computed(tmp_path):
+    """The second method never ends; the first one's row is in the file while it hangs."""
+    told: list[Row] = []
+    file = tmp_path / RESULTS
+
+    def tell(row: Row) -> None:
+        told.append(row)
+        row.append_to(file)
+        hanging.append(len(read_rows(file)))
+
+    hanging: list[int] = []
+    tasks = tuple(replace(SMALL[0], method=name) for name in ("good", "hangs"))
+    rows = run_group(Group(tasks, 2.0, "tests.benchmarks.faulty_child"), tell)
+    assert rows == told
+    assert hanging == [1, 2]
+    # UTC, in whole seconds: the second is lost when its limit of two seconds has passed.
+    first, second = (datetime.fromisoformat(row.when) for row in rows)
+    assert (second - first).total_seconds() >= 1.0
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from benchmarks.sweep.lock import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_second_sweep_is_kept_out_until_the_first_is_dead(tmp_path, capsys):
+    before = Row.lost(SMALL[0], CRASHED, "a test", 1.0)
+    before.append_to(tmp_path / RESULTS)
+    command = [sys.executable, "-c", HOLDER, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(SweepError, match=f"another sweep writes to .*process {holder.pid} on"):
+            sweep(SMALL[:1], tmp_path, resume=False, progress=False)
+        words = ["run", "--case", QUICK.name, "--solver", DIRECT[0], "--starts", "1", "--resume"]
+        assert main([*words, "--out", str(tmp_path)]) == 2
+        assert f"process {holder.pid} on" in capsys.readouterr().out
+        holder.kill()
+    assert sweep(SMALL[:1], tmp_path, resume=True, progress=False) == (before,)
+
+
 def test_tasks_are_grouped_by_what_they_share():
     case = [case for case in all_cases() if case.name == "van-der-pol"]
     methods = [method for method in all_methods() if method.name in DIRECT]
     tasks = tasks_of(case, methods, Settings(1, 0), Settings(1, 1), Settings(2, 0))
-    assert len({task.key for task in tasks}) == 6
-    assert [len(group) for group in groups_of(tasks)] == [2, 2, 2]
+    assert len({task.key for task in tasks}) == 9
+    assert [len(group) for group in groups_of(tasks)] == [3, 3, 3]
 
 
 KILLS = 10
 SWEPT = [
     sys.executable, "-m", "benchmarks", "run", "--workers", "2",
-    "--case", "van-der-pol", "double-integrator-energy", "bryson-denham",
-    "--solver", *DIRECT, "--starts", "1", "--seeds", "0", "1",
+    "--case", "van-der-pol", "double-integrator-energy",
+    "--solver", *DIRECT, "--starts", "1",
 ]  # fmt: skip
+ROWS = 6
 TIMES = {"build_time", "solve_time", "when"}
 
 
@@ -136,7 +195,7 @@ def test_a_sweep_killed_ten_times_has_the_rows_of_an_undisturbed_one(tmp_path):
     for folder in folders:
         rows = read_rows(folder / RESULTS)
         assert without_times(rows) == without_times(calm)
-        assert len((folder / RESULTS).read_text().splitlines()) == len(rows) == 12
+        assert len((folder / RESULTS).read_text().splitlines()) == len(rows) == ROWS
 
 
 @pytest.mark.slow

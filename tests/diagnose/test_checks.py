@@ -1,12 +1,15 @@
 """Every check on a small problem whose numbers can be worked out by hand."""
 
+import re
+
 import casadi as ca
 import numpy as np
 import pytest
 
 from benchmarks.mistakes import problems as of
-from ocp import OCP, Box, Constraint, Data, FreeTime, Guess, Model
+from ocp import OCP, Box, Constraint, Data, FreeTime, Guess, Model, Signal
 from solvers import Cause, MultipleShooting, Severity, diagnose
+from solvers.diagnose.conditioning import conditioning
 from solvers.diagnose.curvature import curvature
 from solvers.diagnose.degrees import degrees
 from solvers.diagnose.duplicate import duplicate
@@ -81,6 +84,25 @@ def test_rate_for_a_next_state_and_back():
     assert only(time_kind, of.cart(dt=0.05, horizon=40)).cause is Cause.TIME_KIND
     sampled = of.regulator(dt=None, horizon=4.0)
     assert only(time_kind, sampled).cause is Cause.TIME_KIND
+
+
+def test_a_single_next_state_does_not_fall():
+    """Solutions of one differential equation cannot cross, so that x -> x(dt) rises."""
+    found = only(time_kind, of.tank(dt=0.1, horizon=50))
+    assert (found.cause, found.where) == (Cause.TIME_KIND, ("level",))
+    assert found.evidence < 0.0
+    sampled = of.tank(dt=0.1, horizon=50, f=lambda s: (s.level + 0.1 * (s.inflow - s.level),))
+    assert not list(time_kind(subject(sampled)))
+
+
+def test_a_signal_goes_by_its_name_and_its_symbol():
+    ocp = of.servo(
+        running_cost=lambda s: (s.spot / s.wanted - 1) ** 2 + 0.01 * s.voltage**2,
+        parameters=lambda s: (
+            Signal("reference", s.wanted, np.linspace(1.0, 0.0, 21), hold="linear"),
+        ),
+    )
+    assert only(not_finite, ocp).where == ("reference", "wanted")
 
 
 def test_constraint_without_a_bound():
@@ -189,6 +211,22 @@ def test_stiffness_says_how_many_steps():
     assert str(int(np.ceil(5e4 / 2.78))) in found.sentence
 
 
+def test_the_fastest_motion_names_the_same_states_in_any_unit():
+    """A mass of 1 kg on a spring of 10^6 N/m: place and speed move in one motion."""
+
+    def spring(unit: float) -> OCP:
+        return of.cart(
+            f=lambda s: (s.velocity / unit, unit * (s.force - 1e6 * s.position)),
+            constraints=(),
+            terminal_cost=lambda s: s.position**2,
+        )
+
+    for unit in (1e-3, 1.0, 1e3):
+        found = only(grid, spring(unit))
+        assert set(found.where) == {"position", "velocity"}
+        assert "time constant of 0.001 s" in found.sentence
+
+
 def test_dependent_ends():
     ocp = of.cart(
         constraints=lambda s: (
@@ -233,6 +271,53 @@ def test_scaling_says_what_to_divide_by():
     assert "divide altitude by 1e+07" in found.sentence
 
 
+def in_units_of(size: float) -> OCP:
+    """The cart, its force in another unit."""
+    return of.cart(
+        f=lambda s: (s.velocity, s.force * size / 2),
+        running_cost=lambda s: (s.force * size) ** 2,
+        control_bounds=Box(-10.0 / size, 10.0 / size),
+    )
+
+
+def test_balancing_takes_units_out_of_the_condition_number():
+    known = conditioning(subject(in_units_of(1.0)))
+    other = conditioning(subject(in_units_of(1e-3)))
+    assert known is not None
+    assert other is not None
+    assert other.raw > 1e3 * known.raw
+    assert other.balanced == pytest.approx(known.balanced, rel=0.5)
+    assert other.gain > 1e3 * known.gain
+    assert other.large == "force"
+
+
+def test_condition_number_by_hand():
+    """One interval of x' = u, both ends given: free are u and nothing else, as x is bounded.
+
+    For x0 = 0, x1 = 1, h = 1 the unknowns x0, x1, u have the rows x0 + u - x1 = 0, x1 = 1, and x0
+    sits on its bound; the cost 2 u^2 bends by 4.
+    """
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    ocp = OCP(
+        name="one interval",
+        model=Model(name="integrator", x=x, u=u, f=u),
+        x0=[0.0],
+        horizon=1.0,
+        running_cost=2 * u**2,
+        constraints=(Constraint("end", x, 1.0, 1.0, at="terminal"),),
+    )
+    # Columns x1, u, and the multipliers of dynamics and end; signs do not change it.
+    k = np.array([[0, 0, 1, 1], [0, 4, -1, 0], [1, -1, 0, 0], [1, 0, 0, 0]], dtype=float)
+    known = conditioning(subject(ocp, intervals=1))
+    assert known is not None
+    assert known.raw == pytest.approx(np.linalg.cond(k), rel=MINIMISER)
+
+
+def test_no_condition_number_of_a_failed_trial():
+    failed = of.cart(state_bounds=Box([-np.inf, -5.0], [np.inf, 0.0]))
+    assert conditioning(subject(failed)) is None
+
+
 def test_cost_that_falls_without_limit():
     ocp = of.cart(
         running_cost=lambda s: s.force**2 + s.velocity**3, control_bounds=Box(), constraints=()
@@ -273,6 +358,18 @@ def test_out_of_reach_in_numbers():
     assert found.instant == pytest.approx(0.5)
     assert "would have to give way by 22 N" in found.sentence
     assert "With a horizon of 0.8" in found.sentence
+
+
+def test_a_speed_limit_is_a_matter_of_time():
+    """5 m/s^2 up to 0.4 m/s and down again over 1 m: 1 / 0.4 + 0.4 / 5 = 2.58 s, not 2 s."""
+    slow = of.cart(state_bounds=Box([-np.inf, -0.4], [np.inf, 0.4]))
+    found = diagnose(slow).first
+    assert found is not None
+    assert found.cause is Cause.OUT_OF_REACH
+    assert {"end position", "velocity"} <= set(found.where)
+    told = re.search(r"With a horizon of ([\d.]+) s", found.sentence)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(2.58, rel=0.01)
 
 
 def test_time_that_vanishes_and_time_without_end():

@@ -148,6 +148,8 @@ def test_or_raise(status: Status) -> None:
         with pytest.raises(SolverError, match="here and there") as caught:
             solution.or_raise()
         assert status.value in str(caught.value)
+        assert "diagnose(solution)" in str(caught.value)
+        assert "diagnose(solution)" in repr(solution)
 
 
 def test_only_two_outcomes_are_a_success() -> None:
