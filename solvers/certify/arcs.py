@@ -15,6 +15,10 @@ _MET = 1e-3
 _SHORTEST, _SHORTEST_FREE = 2e-3, 2e-2
 
 
+class NoArcsError(Exception):
+    """A method on arcs has nothing to say; the message says why."""
+
+
 @dataclass(frozen=True)
 class Law:
     """What decides a control while something is active.
@@ -22,11 +26,13 @@ class Law:
     Attributes:
         name: what is active, for people and for comparison.
         value: the control, in the states, the time and the parameters of the problem.
+        push: times H_u it is not positive at an optimum: the multiplier has the right sign.
         row: which row of the path constraints it keeps at its bound; None: a bound of the control.
     """
 
     name: str
     value: ca.SX
+    push: ca.SX
     row: int | None = None
 
 
@@ -80,10 +86,11 @@ def _laws(ocp: OCP, j: int) -> list[tuple[Law, ca.SX]]:
     """What can decide a control, and by how much each is missed."""
     u, found = ca.vertsplit(ocp.model.u)[j], []
     box = ocp.control_bounds
-    for side, values in (("lower", box.lower), ("upper", box.upper)):
+    for side, sign, values in (("lower", -1.0, box.lower), ("upper", 1.0, box.upper)):
         bound = float(np.asarray(values)[j])
         if np.isfinite(bound):
-            found.append((Law(f"{side} bound of {u}", ca.SX(bound)), _missed(u, bound)))
+            law = Law(f"{side} bound of {u}", ca.SX(bound), ca.SX(sign))
+            found.append((law, _missed(u, bound)))
     rows = [
         (c.name, e, float(low), float(high))
         for c in ocp.at("path")
@@ -96,9 +103,10 @@ def _laws(ocp: OCP, j: int) -> list[tuple[Law, ca.SX]]:
         if slope.nnz() != 1 or slope.sparsity().get_col() != [j] or ca.depends_on(slope, u):
             continue
         rest = ca.substitute(e, u, 0.0)
-        for side, bound in (("lower", low), ("upper", high)):
+        for side, sign, bound in (("lower", -1.0, low), ("upper", 1.0, high)):
             if np.isfinite(bound):
-                law = Law(f"{name} {side}", (bound - rest) / slope[0, j], i)
+                push = sign * slope[0, j]
+                law = Law(f"{name} {side}", (bound - rest) / slope[0, j], push, i)
                 found.append((law, _missed(e, bound)))
     return found
 

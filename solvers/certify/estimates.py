@@ -26,7 +26,7 @@ _GRIDS = 4
 # Odd, for the reason of PARTS.
 _INTERVALS = 9
 # Collocation: of the interior-point method; of the dynamics between the points; of the mesh.
-_BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
+BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
 # A cost that changes by less from mesh to mesh, relative, is at its limit.
 _SETTLED = 1e-11
 _MOST_INTERVALS = 1000
@@ -83,7 +83,7 @@ def by_collocation(coarse: Solution) -> Estimate:
     Raises:
         NoEstimateError: if no mesh is solved.
     """
-    solver = Collocation(intervals=_INTERVALS, tolerance=_BARRIER)
+    solver = Collocation(intervals=_INTERVALS, tolerance=BARRIER)
     try:
         found = refined(coarse, solver=solver, accuracy=_DEFECT)
     except UnsupportedProblem as reason:
@@ -92,7 +92,7 @@ def by_collocation(coarse: Solution) -> Estimate:
     if not answer.status.is_success:
         raise NoEstimateError(f"collocation: {answer.status.value}. {answer.message}")
     verdict, change = evaluate(answer, tolerance=TOLERANCE), np.inf
-    barrier, bias = _BARRIER if _has_inequalities(coarse.problem) else 0.0, 0.0
+    barrier, bias = BARRIER if _has_inequalities(coarse.problem) else 0.0, 0.0
     for finer in localised(answer, found.rounds[-1].mesh.cut(PARTS), _ROUNDS, solver):
         before, answer = verdict.cost, finer
         verdict = evaluate(answer, tolerance=TOLERANCE)
@@ -130,7 +130,7 @@ def by_shooting(coarse: Solution) -> Estimate:
     while len(verdicts) < _GRIDS or (
         not is_steady([v.cost for v in verdicts]) and 2 * (len(answer.t) - 1) <= _MOST_INTERVALS
     ):
-        answer = _solved(MultipleShooting(2 * (len(answer.t) - 1)), answer)
+        answer = solved(MultipleShooting(2 * (len(answer.t) - 1)), answer)
         verdicts.append(evaluate(answer, tolerance=TOLERANCE))
     cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
     barrier = MultipleShooting().tolerance if _has_inequalities(coarse.problem) else 0.0
@@ -152,7 +152,7 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
     """
     while True:
         try:
-            return _solved(MultipleShooting(intervals, tolerance=_BARRIER), solution)
+            return solved(MultipleShooting(intervals, tolerance=BARRIER), solution)
         except NoEstimateError:
             intervals *= 2
             if intervals > _MOST_INTERVALS:
@@ -184,7 +184,7 @@ def is_steady(costs: Sequence[float] | np.ndarray) -> bool:
     return bool(((ratios >= _LEAST_RATIO) & (ratios <= _MOST_RATIO)).all())
 
 
-def _solved(solver: MultipleShooting, guess: Solution) -> Solution:
+def solved(solver: MultipleShooting, guess: Solution) -> Solution:
     data = guess.data
     program = solver.build(guess.problem)
     answer = program.run(x0=data.x0, t0=data.t0, parameters=guess.parameters, guess=guess)

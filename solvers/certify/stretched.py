@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Box, Constraint, FreeTime, Guess, Model, Signal, Solution
-from solvers.certify.arcs import Arc
+from solvers.certify.arcs import Arc, NoArcsError
 
 # Samples of the guess on each arc.
 _SAMPLES = 20
@@ -34,6 +34,11 @@ class Stretched:
 
     start: Solution
     arcs: tuple[Arc, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse signals, which are sampled over the horizon."""
+        if any(isinstance(entry, Signal) for entry in self.start.problem.parameters):
+            raise NoArcsError("signals are not looked at")
 
     @cached_property
     def _now(self) -> ca.SX:
@@ -132,6 +137,31 @@ class Stretched:
                 row += 1
             found.append(Constraint(c.name, ca.vertcat(*parts), c.lower, c.upper))
         return found
+
+    def trajectory(self, answer: Solution) -> Solution:
+        """Return an answer to the stretched problem, controls held, as one to the original."""
+        ocp, count = self.start.problem, len(self.arcs)
+        m, each = ocp.model, (len(answer.t) - 1) // count
+        controls = ca.Function("u", [m.x, m.t, m.u, ocp.p, self._now], [self._control])
+        arc = np.repeat(np.eye(count), each, axis=0)
+        p = np.tile(self.start.data.values.at(0.0), (len(arc), 1))
+        x, t = answer.x[:, : m.nx], answer.x[:, m.nx]
+        ends = [
+            np.array(controls.map(len(arc))(*[v.T for v in (x[k], t[k][:, None], answer.u, p, arc)]))
+            for k in (slice(0, -1), slice(1, None))
+        ]
+        return self.start.with_(
+            solver=f"direct multiple shooting on {count} arcs",
+            t=t,
+            x=x,
+            costate=answer.costate[:, : m.nx],
+            u=np.stack(ends, axis=2).transpose(1, 2, 0).reshape(-1, m.nu),
+            control_kind="polynomial",
+            breaks=np.arange(len(t)),
+            cost=answer.cost,
+            status=answer.status,
+            message=answer.message,
+        )
 
     @property
     def guess(self) -> Guess:
