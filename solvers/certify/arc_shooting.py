@@ -130,9 +130,7 @@ class ArcShooting:
     def _flow(self, u: ca.SX) -> ca.Function:
         m = self.start.problem.model
         own = ca.substitute(self._hamiltonian, m.u, u)
-        rate_of = self._function(
-            [ca.vertcat(ca.substitute(m.f, m.u, u), -ca.gradient(own, m.x))]
-        )
+        rate_of = self._function([ca.vertcat(ca.substitute(m.f, m.u, u), -ca.gradient(own, m.x))])
         z, t, h = ca.SX.sym("z", 2 * m.nx), ca.SX.sym("t"), ca.SX.sym("h")
         k1 = rate_of(z, t)
         k2 = rate_of(z + h / 2.0 * k1, t + h / 2.0)
@@ -153,7 +151,7 @@ class ArcShooting:
         z, lengths, _ = self._split(w)
         h = np.repeat(lengths / (self.nodes * self.steps), self.nodes)
         begins = self.start.data.t0 + np.append(0.0, np.cumsum(h * self.steps))
-        rows, controls = [], []
+        rows, controls, part = [], [], z
         for k, begin in enumerate(begins[:-1]):
             i = k // self.nodes
             run = np.array(self._flows[i](z[:, k], begin, h[k]))
@@ -185,8 +183,12 @@ class ArcShooting:
         for i, arc in enumerate(self.arcs):
             at = slice(i * pieces, (i + 1) * pieces + 1)
             z = np.hstack([trajectory.x[at], trajectory.costate[at]]).T
-            pushes = [law.push * s for law, s in zip(arc.laws, ca.vertsplit(slope), strict=True) if law]
-            bound = [ca.substitute(p, self.start.problem.model.u, self._controls[i]) for p in pushes]
+            pushes = [
+                law.push * s for law, s in zip(arc.laws, ca.vertsplit(slope), strict=True) if law
+            ]
+            bound = [
+                ca.substitute(p, self.start.problem.model.u, self._controls[i]) for p in pushes
+            ]
             values = self._function([ca.vertcat(ca.SX(0, 1), *bound)])
             pulled = np.array(values.map(z.shape[1])(z, trajectory.t[at][None]))
             worst = max(worst, float(pulled.max(initial=0.0)))
@@ -269,6 +271,4 @@ class ArcShooting:
             jacobian = np.array(slope(w))
             return lambda r: np.linalg.lstsq(jacobian, r, rcond=None)[0]
 
-        return newton(
-            residual, linearise, guess, tolerance=tolerance, max_steps=50, damped=True
-        )
+        return newton(residual, linearise, guess, tolerance=tolerance, max_steps=50, damped=True)

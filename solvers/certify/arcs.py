@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -76,7 +77,7 @@ def arcs_of(answer: Solution) -> tuple[Arc, ...]:
     met = [_met(answer, j, laws[j]) for j in range(answer.problem.model.nu)]
     pieces = [
         Arc(float(left), float(right), tuple(m[k] for m in met))
-        for k, (left, right) in enumerate(zip(edges[:-1], edges[1:], strict=True))
+        for k, (left, right) in enumerate(pairwise(edges))
     ]
     long = [arc for arc in _joined(pieces) if arc.end - arc.start > arc.shortest]
     return tuple(_joined(list(_meeting(_joined(long)))))
@@ -146,6 +147,6 @@ def _joined(arcs: list[Arc]) -> list[Arc]:
 
 def _meeting(arcs: list[Arc]) -> Iterator[Arc]:
     """Let the arcs meet in the middle of what lies between them."""
-    ends = [(a.end + b.start) / 2.0 for a, b in zip(arcs, arcs[1:], strict=False)]
+    ends = [(a.end + b.start) / 2.0 for a, b in pairwise(arcs)]
     for arc, start, end in zip(arcs, [0.0, *ends], [*ends, 1.0], strict=True):
         yield Arc(start, end, arc.laws)

@@ -88,21 +88,22 @@ def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
 def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Durations and held controls by multiple shooting, on grids doubled on every arc."""
     stretched, verdicts = Stretched(answer, arcs), []
-    ocp, guess = stretched.ocp, stretched.guess
+    ocp, found = stretched.ocp, None
     for intervals in _INTERVALS:
-        solver = MultipleShooting(intervals * len(arcs), tolerance=BARRIER)
-        guess = solver.build(ocp).run(parameters=answer.parameters, guess=guess)
-        if not guess.status.is_success:
-            raise NoArcsError(f"{guess.status.value}. {guess.message}")
-        verdicts.append(evaluate(guess, tolerance=TOLERANCE))
+        program = MultipleShooting(intervals * len(arcs), tolerance=BARRIER).build(ocp)
+        found = program.run(parameters=answer.parameters, guess=found or stretched.guess)
+        if not found.status.is_success:
+            raise NoArcsError(f"{found.status.value}. {found.message}")
+        verdicts.append(evaluate(found, tolerance=TOLERANCE))
+    assert found is not None
     if not verdicts[-1].violation <= _VIOLATION:
         raise NoArcsError(f"{verdicts[-1].worst} is violated by {verdicts[-1].violation:.1e}")
     cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
     return Estimate(
-        method=f"direct multiple shooting on {len(arcs)} arcs, {len(guess.t) - 1} intervals",
+        method=f"direct multiple shooting on {len(arcs)} arcs, {len(found.t) - 1} intervals",
         cost=cost,
-        error=max(error, BARRIER * len(guess.t), verdicts[-1].cost_error),
+        error=max(error, BARRIER * len(found.t), verdicts[-1].cost_error),
         violation=verdicts[-1].violation,
-        solution=stretched.trajectory(guess),
+        solution=stretched.trajectory(found),
         sentence=said,
     )

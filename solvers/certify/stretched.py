@@ -147,7 +147,9 @@ class Stretched:
         p = np.tile(self.start.data.values.at(0.0), (len(arc), 1))
         x, t = answer.x[:, : m.nx], answer.x[:, m.nx]
         ends = [
-            np.array(controls.map(len(arc))(*[v.T for v in (x[k], t[k][:, None], answer.u, p, arc)]))
+            np.array(
+                controls.map(len(arc))(*[v.T for v in (x[k], t[k][:, None], answer.u, p, arc)])
+            )
             for k in (slice(0, -1), slice(1, None))
         ]
         return self.start.with_(
@@ -169,9 +171,7 @@ class Stretched:
         s = np.linspace(0.0, len(self.arcs), _SAMPLES * len(self.arcs) + 1)
         edges = np.concatenate([[0.0], np.cumsum(self.lengths)])
         times = np.interp(s, np.arange(len(edges)), edges) + self.start.t[0]
-        x = np.hstack(
-            [self.start.state(times), times[:, None], np.tile(self.lengths, (len(s), 1))]
-        )
+        x = np.hstack([self.start.state(times), times[:, None], np.tile(self.lengths, (len(s), 1))])
         return Guess(x=x, u=self.start.control(times))
 
 
