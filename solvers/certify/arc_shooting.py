@@ -204,7 +204,7 @@ class ArcShooting:
     # -- the equations ----------------------------------------------------------------
 
     @cached_property
-    def _system(self) -> tuple[ca.Function, ca.Function]:
+    def system(self) -> tuple[ca.Function, ca.Function]:
         """Residual and its Jacobian."""
         ocp, count = self.start.problem, len(self.arcs)
         nx, total = ocp.model.nx, len(self.arcs) * self.nodes
@@ -262,7 +262,7 @@ class ArcShooting:
 
     def solve(self, guess: np.ndarray, tolerance: float) -> NewtonResult:
         """Newton's method, damped."""
-        value, slope = self._system
+        value, slope = self.system
 
         def residual(w: np.ndarray) -> tuple[np.ndarray, None]:
             return np.array(value(w)).ravel(), None

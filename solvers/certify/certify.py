@@ -1,7 +1,7 @@
 """Certify an optimal value: independent methods, and every condition that can be checked."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -82,7 +82,7 @@ class _Clock:
     """When to begin nothing any more."""
 
     seconds: float
-    begun: float = field(default_factory=perf_counter)
+    begun: float
 
     @property
     def is_late(self) -> bool:
@@ -122,7 +122,7 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         UnsupportedProblem: if direct multiple shooting solves the problem on no grid.
     """
     effort = effort or Effort()
-    clock = _Clock(effort.seconds)
+    clock = _Clock(effort.seconds, perf_counter())
     try:
         coarse = on_grid(solution, effort.intervals)
     except NoEstimateError as reason:

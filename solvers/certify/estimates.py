@@ -25,8 +25,9 @@ _LEAST_RATIO, _MOST_RATIO = 1.5, 20.0
 _GRIDS = 4
 # Orders that smoothness explains, and how closely the last two ratios have to show one.
 _SMOOTH_ORDERS, _CLOSE = (2.0, 4.0), 0.15
-# Of this many differences the largest is the error where there is no order at all.
-_ERRATIC = 3
+# Of so many differences the largest is the error: where the order is none that smoothness
+# explains, and where there is no order at all.
+_DOUBTFUL, _ERRATIC = 2, 3
 # Odd, for the reason of PARTS.
 _INTERVALS = 9
 # Collocation: of the interior-point method; of the dynamics between the points; of the mesh.
@@ -172,8 +173,8 @@ def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
     differences both show the order of a smooth problem, 2 or 4, its error is its change from the
     grids before. Where a control jumps between the nodes, the error depends on where in its
     interval it jumps: differences may shrink steadily for a while, but no power is behind it, and
-    the error is all that was extrapolated, and the last difference at least. Where differences do
-    not even shrink steadily, it is the largest of the last three.
+    the error is all that was extrapolated, and the larger one of the last two differences at
+    least. Where differences do not even shrink steadily, it is the largest of the last three.
 
     Args:
         costs: (at least 4,), coarsest first.
@@ -188,7 +189,7 @@ def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
     error, said = abs(float(limits[-1] - limits[-2])), f"the observed order {orders[-1]:.2f}"
     if any((np.abs(orders[-2:] - order) <= _CLOSE).all() for order in _SMOOTH_ORDERS):
         return limit, error, f"extrapolated with {said}"
-    error = max(error, abs(limit - last), abs(float(steps[-1])))
+    error = max(error, abs(limit - last), float(np.abs(steps[-_DOUBTFUL:]).max()))
     return limit, error, f"extrapolated with {said}, which is no power: all of it is in doubt"
 
 
