@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ocp import ProblemError, Solution, evaluate
+from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
 from solvers.certify.arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.certificate import Estimate
@@ -40,8 +41,10 @@ def by_arcs(answer: Solution) -> Estimate:
         NoEstimateError: where no control is at a bound on any arc, or neither works.
     """
     arcs = arcs_of(answer)
-    if not any(law for arc in arcs for law in arc.laws) or len(arcs) > _MOST_ARCS:
-        raise NoEstimateError(f"{len(arcs)} arcs, on which no control is at a bound for long")
+    if not any(law for arc in arcs for law in arc.laws):
+        raise NoEstimateError("no control is at a bound for long")
+    if len(arcs) > _MOST_ARCS:
+        raise NoEstimateError(f"{len(arcs)} arcs: no more than {_MOST_ARCS} are looked at")
     try:
         return _indirect(answer, arcs)
     except NoArcsError as reason:
@@ -53,7 +56,7 @@ def by_arcs(answer: Solution) -> Estimate:
 
 def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Newton on the minimum principle, steps halved until the referee's cost holds still."""
-    shooting = ArcShooting(answer, arcs, steps=_STEPS)
+    shooting = ArcShooting(ArcConditions(answer, arcs), steps=_STEPS)
     w, before, change = shooting.guess(), np.inf, np.inf
     while True:
         found = shooting.solve(w, _RESIDUAL)

@@ -14,6 +14,7 @@ from models import (
 )
 from ocp import OCP, Constraint, Signal, Solution, solve
 from solvers import Collocation, Verdict
+from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
 from solvers.certify.arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.by_arcs import by_arcs
@@ -74,7 +75,7 @@ def test_closed_forms(build, optimum, kind):
 
 def test_the_jacobian_of_the_equations():
     answer, arcs = fewest(double_integrator_bounded_energy())
-    shooting = ArcShooting(answer, arcs, nodes=2, steps=4)
+    shooting = ArcShooting(ArcConditions(answer, arcs), nodes=2, steps=4)
     value, slope = shooting.system
     w = shooting.guess()
     assert value.numel_out(0) == len(w)
@@ -90,7 +91,7 @@ def test_the_jacobian_of_the_equations():
 def test_arcs_in_the_wrong_order_are_no_extremal():
     answer, (push, brake) = fewest(double_integrator_minimum_time())
     wrong = (Arc(0.0, 0.5, brake.laws), Arc(0.5, 1.0, push.laws))
-    shooting = ArcShooting(answer, wrong)
+    shooting = ArcShooting(ArcConditions(answer, wrong))
     found = shooting.solve(shooting.guess(), 1e-10)
     lengths = found.x[-4:-2]
     assert not found.converged or lengths.min() < 0.0
@@ -98,7 +99,7 @@ def test_arcs_in_the_wrong_order_are_no_extremal():
 
 def test_a_multiplier_of_the_wrong_sign_is_seen():
     answer, arcs = fewest(double_integrator_minimum_time())
-    shooting = ArcShooting(answer, arcs)
+    shooting = ArcShooting(ArcConditions(answer, arcs))
     trajectory = shooting.trajectory(shooting.solve(shooting.guess(), 1e-10).x)
     assert shooting.wrong_signs(trajectory) <= 1e-12
     turned = trajectory.with_(costate=-trajectory.costate)
@@ -110,7 +111,7 @@ def test_what_is_not_said_is_said():
         by_arcs(collocated(double_integrator_energy()))
     answer, arcs = fewest(turnpike())
     with pytest.raises(NoArcsError, match="not quadratic in u"):
-        ArcShooting(answer, arcs)
+        ArcConditions(answer, arcs)
 
 
 def test_signals_and_free_starts_are_refused():
@@ -125,10 +126,10 @@ def test_signals_and_free_starts_are_refused():
     }
     signal = Signal("w", ca.SX.sym("w"), np.zeros(3))
     followed = answer.with_(problem=OCP(name="w", parameters=(signal,), **parts))
-    for refusing in (ArcShooting, Stretched):
+    for refusing in (ArcConditions, Stretched):
         with pytest.raises(NoArcsError, match="signals"):
             refusing(followed, arcs)
     start = Constraint("start", ocp.model.x, 0.0, 0.0, at="initial")
     free = answer.with_(problem=OCP(name="free", constraints=(start,), **parts))
     with pytest.raises(NoArcsError, match="start is free"):
-        ArcShooting(free, arcs)
+        ArcConditions(free, arcs)
