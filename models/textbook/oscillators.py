@@ -60,8 +60,9 @@ def rayleigh_constrained() -> OCP:
         \dot x_2 = -x_1 + x_2 (1.4 - 0.14 x_2^2) + 4 u, \; u + x_1/6 \le 0, \quad
         x(0) = (-5, -5)
 
-    Reference optimum: 44.80444; the constraint acts on three arcs. Problem: [Maurer & Augustin
-    2001], [Betts 2010, example 4.10].
+    Reference optimum: 44.804444908, by indirect shooting on its four arcs: the constraint acts
+    until 1.27, and from 2.98 to 4.30. Problem: [Maurer & Augustin 2001], [Betts 2010, example
+    4.10].
     """
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
     rate = ca.vertcat(x[1], -x[0] + x[1] * (1.4 - 0.14 * x[1] ** 2) + 4.0 * u)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ocp import Solution
 
-AGREEMENT = "agreement"
+AGREEMENT, CONVEXITY, STARTS = "agreement", "convexity", "other starts"
 _MOST_DIGITS = 16.0
 
 
@@ -128,6 +128,18 @@ class Certificate:
         return len(self.estimates) > 1 and not failed
 
     @property
+    def scope(self) -> str:
+        """Of what it is a certificate: of a local optimum, unless the problem is convex."""
+        said = {check.name: check for check in self.checks}
+        if CONVEXITY in said and said[CONVEXITY].verdict is Verdict.HOLDS:
+            return "of the global optimum: the problem is convex"
+        local = "of a LOCAL optimum; that it is the global one is not shown"
+        if STARTS not in said or said[STARTS].verdict is Verdict.NOT_CHECKED:
+            return f"{local}, and no other start was tried"
+        cheaper = "nothing cheaper" if said[STARTS].verdict is Verdict.HOLDS else "a cheaper one"
+        return f"{local}, other starts found {cheaper}"
+
+    @property
     def not_checked(self) -> tuple[Check, ...]:
         """What the certificate does not say."""
         return tuple(c for c in self.checks if c.verdict is Verdict.NOT_CHECKED)
@@ -151,6 +163,7 @@ class Certificate:
         lower, upper = self.interval
         word = "certified" if self.holds else "NOT certified"
         yield f"{self.problem}: {word}, {self.cost:.12g} in [{lower:.12g}, {upper:.12g}]"
+        yield f"  {self.scope}"
         for e in self.estimates:
             yield f"  {e.method}: {e.cost:.12g} +- {e.error:.1e} ({e.sentence})"
         for check in self.checks:
@@ -164,6 +177,7 @@ class Certificate:
             "interval": list(self.interval),
             "digits": round(self.digits, 2),
             "holds": self.holds,
+            "scope": self.scope,
             "estimates": [
                 {"method": e.method, "cost": e.cost, "error": e.error, "how": e.sentence}
                 for e in self.estimates

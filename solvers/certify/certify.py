@@ -1,10 +1,23 @@
 """Certify an optimal value: independent methods, and every condition that can be checked."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from time import perf_counter
 
-from ocp import Solution, Status, UnsupportedProblem, instance, whole
-from solvers.certify.certificate import AGREEMENT, Certificate, Check, Estimate, Verdict, agreement
+import numpy as np
+
+from ocp import ProblemError, Solution, Status, UnsupportedProblem, instance, whole
+from solvers.certify.by_arcs import by_arcs
+from solvers.certify.certificate import (
+    AGREEMENT,
+    CONVEXITY,
+    STARTS,
+    Certificate,
+    Check,
+    Estimate,
+    Verdict,
+    agreement,
+)
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
 from solvers.certify.estimates import (
@@ -15,14 +28,13 @@ from solvers.certify.estimates import (
     on_grid,
 )
 from solvers.certify.global_evidence import (
-    CONVEXITY,
     EXTREMALS,
-    STARTS,
     convexity,
     every_extremal,
     other_data,
     other_starts,
 )
+from solvers.certify.grid_conditions import CHECKS as GRID
 from solvers.certify.grid_conditions import grid_checks
 
 # So many independent methods are compared.
@@ -46,30 +58,58 @@ class Effort:
         starts: random starts in the search for something cheaper.
         seed: of these.
         enumerate: whether extremals are enumerated where that is possible.
+        seconds: after so many no further method and no further check is begun; what has begun
+            is finished. What was left out counts as not checked.
     """
 
     intervals: int = 40
     starts: int = 5
     seed: int = 0
     enumerate: bool = True
+    seconds: float = np.inf
 
     def __post_init__(self) -> None:
         """Check the numbers."""
         whole(self.intervals, "certify: intervals")
         whole(self.starts, "certify: starts")
         whole(self.seed, "certify: seed", least=0)
+        if not self.seconds > 0.0:
+            raise ProblemError(f"certify: seconds = {self.seconds}, they must be positive")
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """When to begin nothing any more."""
+
+    seconds: float
+    begun: float
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the time is over."""
+        return perf_counter() - self.begun > self.seconds
+
+    def checks(self, names: Sequence[str], make: Callable[[], Sequence[Check]]) -> list[Check]:
+        """Make some checks, or say that there was no time for them."""
+        return [self.left_out(name) for name in names] if self.is_late else list(make())
+
+    def left_out(self, name: str) -> Check:
+        """Return a check that was not made for lack of time."""
+        return Check.skipped(name, f"left out: the {self.seconds:g} s it was given were over")
 
 
 def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     """Certify the optimal value of the problem that a solution solves.
 
-    Methods that share nothing but the problem are taken to the end, as far as they apply:
-    indirect multiple shooting, refined collocation, direct multiple shooting extrapolated over
-    its grids; in discrete time the nonlinear program and a linear method. The first two have
-    to agree to 8 digits where an extremal is one of them, to 5 where not, and to a thousandth of
-    the cost itself. Then the referee's word on the trajectory, the Hamiltonian, the second-order
-    test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of the optimum being
-    the global one.
+    Methods that differ in what they discretise and solve are taken to the end, as far as they
+    apply: indirect multiple shooting, refined collocation, shooting over the arcs that it shows,
+    direct multiple shooting extrapolated over its grids; in discrete time the nonlinear program
+    and a linear method. They share the problem's description, its derivatives (CasADi), a
+    direct answer to start from, for most of them the interior-point method, and the referee who
+    says what their answers cost. The first two have to agree to 8 digits where an extremal is one
+    of them, to 5 where not, and to a thousandth of the cost itself. Then the referee's word on the
+    trajectory, the Hamiltonian, the second-order test, the Karush-Kuhn-Tucker conditions on a grid,
+    and what can be said of the optimum being the global one.
 
     Args:
         solution: near the optimum that is to be certified; of any method.
@@ -84,17 +124,18 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
     effort = effort or Effort()
     instance(solution, Solution, "certify: solution")
     instance(effort, Effort, "certify: effort")
+    clock = _Clock(effort.seconds, perf_counter())
     try:
         coarse = on_grid(solution, effort.intervals)
     except NoEstimateError as reason:
         raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
-    estimates, silent = _estimates(solution, coarse)
+    estimates, silent = _estimates(solution, coarse, clock)
     if not estimates:
         why = " ".join(check.sentence for check in silent)
         raise UnsupportedProblem(f"{solution.problem.name}: no method certifies it. {why}")
     best = estimates[0]
     smooth = best.is_extremal
-    on_the_grid = grid_checks(coarse)
+    on_the_grid = clock.checks(GRID, lambda: grid_checks(coarse))
     checks = [
         _agreement(estimates, smooth),
         _relative_agreement(estimates),
@@ -103,20 +144,25 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
         *on_the_grid,
-        *_global(best, effort, len(coarse.t) - 1),
+        *_global(best, effort, len(coarse.t) - 1, clock),
     ]
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
 
 
-def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], list[Check]]:
+def _estimates(
+    solution: Solution, coarse: Solution, clock: _Clock
+) -> tuple[list[Estimate], list[Check]]:
     """What the methods say, an extremal first, then the most accurate; and why others do not.
 
-    Doubled grids of direct shooting are asked only where another method is missing: they are
-    the least accurate.
+    Arcs are looked at, and doubled grids of direct shooting asked, only where another method
+    is missing: the latter are the least accurate.
     """
+    found: list[Estimate] = []
+    silent: list[Check] = []
     methods: dict[str, Callable[[], Estimate]] = {
         "polish": lambda: by_polish(solution),
         "collocation": lambda: by_collocation(coarse),
+        "arcs": lambda: by_arcs(_piecewise(found)),
         "doubled grids": lambda: by_shooting(coarse),
     }
     if solution.problem.model.is_discrete:
@@ -124,11 +170,12 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], li
             "nonlinear program": lambda: by_nonlinear_program(coarse),
             "linear method": lambda: by_linear_method(coarse),
         }
-    found: list[Estimate] = []
-    silent: list[Check] = []
     for name, method in methods.items():
         if len(found) == _METHODS:
             break
+        if clock.is_late:
+            silent.append(clock.left_out(name))
+            continue
         try:
             found.append(method())
         except NoEstimateError as reason:
@@ -137,16 +184,26 @@ def _estimates(solution: Solution, coarse: Solution) -> tuple[list[Estimate], li
     return found, silent
 
 
-def _global(best: Estimate, effort: Effort, intervals: int) -> list[Check]:
+def _piecewise(found: list[Estimate]) -> Solution:
+    """The answer of collocation, which alone shows the arcs."""
+    for estimate in found:
+        if estimate.solution.control_kind == "polynomial":
+            return estimate.solution
+    raise NoEstimateError("collocation shows none")
+
+
+def _global(best: Estimate, effort: Effort, intervals: int, clock: _Clock) -> list[Check]:
     """What can be said of the optimum being the global one."""
     reason = other_data(best.solution)
     if reason:
         return [Check.skipped(name, reason) for name in (CONVEXITY, STARTS, EXTREMALS)]
-    return [
-        convexity(best.solution.problem),
-        other_starts(best, effort.starts, effort.seed, intervals),
-        every_extremal(best) if effort.enumerate else Check.skipped(EXTREMALS, "not asked for"),
-    ]
+    ocp = best.solution.problem
+    starts = clock.checks(
+        [STARTS], lambda: [other_starts(best, effort.starts, effort.seed, intervals)]
+    )
+    if not effort.enumerate:
+        return [convexity(ocp), *starts, Check.skipped(EXTREMALS, "not asked for")]
+    return [convexity(ocp), *starts, *clock.checks([EXTREMALS], lambda: [every_extremal(best)])]
 
 
 def _agreement(estimates: list[Estimate], smooth: bool) -> Check:

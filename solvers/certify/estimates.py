@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ocp import OCP, Box, Solution, UnsupportedProblem, evaluate
+from ocp import OCP, Box, Solution, Status, UnsupportedProblem, evaluate
 from solvers.certify.certificate import Estimate
 from solvers.certify.localised import PARTS, localised
 from solvers.collocation.collocation import Collocation
@@ -23,12 +23,19 @@ _POLISHED, _POLISHED_ROUGH = 1e-10, 1e-9
 # Ratios of successive differences between which extrapolation is believed: orders 0.6 to 4.3.
 _LEAST_RATIO, _MOST_RATIO = 1.5, 20.0
 _GRIDS = 4
+# Orders that smoothness explains, and how closely the last two ratios have to show one.
+_SMOOTH_ORDERS, _CLOSE = (2.0, 4.0), 0.15
+# Of so many differences the largest is the error: where the order is none that smoothness
+# explains, and where there is no order at all.
+_DOUBTFUL, _ERRATIC = 2, 3
 # Odd, for the reason of PARTS.
 _INTERVALS = 9
 # Collocation: of the interior-point method; of the dynamics between the points; of the mesh.
-_BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
+BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
 # A cost that changes by less from mesh to mesh, relative, is at its limit.
 _SETTLED = 1e-11
+# Refinement that ends above its accuracy leaves the rest to the cuts where the control bends.
+_LEFT = 1e-6
 _MOST_INTERVALS = 1000
 
 
@@ -83,16 +90,17 @@ def by_collocation(coarse: Solution) -> Estimate:
     Raises:
         NoEstimateError: if no mesh is solved.
     """
-    solver = Collocation(intervals=_INTERVALS, tolerance=_BARRIER)
+    solver = Collocation(intervals=_INTERVALS, tolerance=BARRIER)
     try:
         found = refined(coarse, solver=solver, accuracy=_DEFECT)
     except UnsupportedProblem as reason:
         raise NoEstimateError(str(reason)) from None
     answer = found.solution
-    if not answer.status.is_success:
+    nearly = answer.status is Status.INACCURATE and found.rounds[-1].error <= _LEFT
+    if not (answer.status.is_success or nearly):
         raise NoEstimateError(f"collocation: {answer.status.value}. {answer.message}")
     verdict, change = evaluate(answer, tolerance=TOLERANCE), np.inf
-    barrier, bias = _BARRIER if _has_inequalities(coarse.problem) else 0.0, 0.0
+    barrier, bias = BARRIER if _has_inequalities(coarse.problem) else 0.0, 0.0
     for finer in localised(answer, found.rounds[-1].mesh.cut(PARTS), _ROUNDS, solver):
         before, answer = verdict.cost, finer
         verdict = evaluate(answer, tolerance=TOLERANCE)
@@ -116,8 +124,7 @@ def by_shooting(coarse: Solution) -> Estimate:
     """Return the value of direct multiple shooting, extrapolated over doubled grids.
 
     Where successive differences of the cost shrink by a steady ratio, Richardson's extrapolation
-    is taken, and its change from the grids before is its error; where not, the finest cost with
-    its last change.
+    is taken; where not, the finest cost. See ``extrapolated`` for the error.
 
     Args:
         coarse: the direct answer on the coarsest grid.
@@ -152,7 +159,7 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
     """
     while True:
         try:
-            return _solved(MultipleShooting(intervals, tolerance=_BARRIER), solution)
+            return _solved(MultipleShooting(intervals, tolerance=BARRIER), solution)
         except NoEstimateError:
             intervals *= 2
             if intervals > _MOST_INTERVALS:
@@ -162,18 +169,28 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
 def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
     """Return the limit of costs on grids doubled each time, its error, and how it was found.
 
+    Richardson's extrapolation assumes one power of the step. Where the last two ratios of
+    differences both show the order of a smooth problem, 2 or 4, its error is its change from the
+    grids before. Where a control jumps between the nodes, the error depends on where in its
+    interval it jumps: differences may shrink steadily for a while, but no power is behind it, and
+    the error is all that was extrapolated, and the larger one of the last two differences at
+    least. Where differences do not even shrink steadily, it is the largest of the last three.
+
     Args:
         costs: (at least 4,), coarsest first.
     """
     steps, last = np.diff(costs), float(costs[-1])
     if not is_steady(costs):
-        change = abs(float(steps[-1]))
-        return last, change, "the change under the last doubling; no steady order"
+        change = float(np.abs(steps[-_ERRATIC:]).max())
+        return last, change, "the largest change of the last three doublings; no steady order"
     ratios = steps[:-1] / steps[1:]
     limits = costs[2:] + steps[1:] / (ratios - 1.0)
-    order = float(np.log2(ratios[-1]))
-    error = abs(float(limits[-1] - limits[-2]))
-    return float(limits[-1]), error, f"extrapolated with the observed order {order:.2f}"
+    limit, orders = float(limits[-1]), np.log2(ratios)
+    error, said = abs(float(limits[-1] - limits[-2])), f"the observed order {orders[-1]:.2f}"
+    if any((np.abs(orders[-2:] - order) <= _CLOSE).all() for order in _SMOOTH_ORDERS):
+        return limit, error, f"extrapolated with {said}"
+    error = max(error, abs(limit - last), float(np.abs(steps[-_DOUBTFUL:]).max()))
+    return limit, error, f"extrapolated with {said}, which is no power: all of it is in doubt"
 
 
 def is_steady(costs: Sequence[float] | np.ndarray) -> bool:

@@ -1,6 +1,6 @@
 """The optimality conditions of the problem on a grid, by linear algebra of its own."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -25,6 +25,7 @@ _CURVED = 1e-7
 _ROWS = 10
 
 INDEPENDENCE, STATIONARITY, CURVATURE = "LICQ", "multipliers", "curvature on the grid"
+CHECKS = INDEPENDENCE, STATIONARITY, CURVATURE
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,8 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
     residual vanishes, with multipliers of the right signs; the Hessian of the Lagrangian is not
     negative on the null space of the active rows. Where it is negative once the inequalities
     without a multiplier are let go, it decides nothing, and the third check counts as not made.
+    Where LICQ fails the multipliers are not unique and neither is that Hessian: at an optimum
+    then some of them make it not negative, not all, and the third check disproves nothing.
 
     Args:
         solution: of direct multiple shooting, controls held.
@@ -68,7 +71,11 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
     """
     transcription = Transcription(solution.problem, len(solution.t) - 1, integrator or RK4())
     point = _point(transcription, solution)
-    return _independence(point), _stationarity(point), _curvature(point)
+    independence, curvature = _independence(point), _curvature(point)
+    if independence.verdict is not Verdict.HOLDS:
+        said = f"{curvature.sentence}; of one of many sets of multipliers, which decides nothing"
+        curvature = replace(curvature, sentence=said, decisive=False)
+    return independence, _stationarity(point), curvature
 
 
 def _point(transcription: Transcription, solution: Solution) -> _Point:

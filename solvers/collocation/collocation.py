@@ -202,7 +202,7 @@ class CollocationProgram(Program):
             t=self.search.times(answer, data),
             x=self._states(answer.w),
             x0=data.x0,
-            costate=costates(tr, answer.lam_g),
+            costate=costates(tr, answer, data),
             u=self._elevated(tr.split(answer.w).c.T),
             control_kind="polynomial",
             breaks=tr.grid.edge_nodes,

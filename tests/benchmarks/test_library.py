@@ -32,14 +32,10 @@ def test_a_case_is_complete(case: Case) -> None:
     assert reference is not None
     assert reference.lower <= reference.value <= reference.upper
     # An interval that says nothing is no reference.
-    assert reference.error <= 1e-6 * max(1.0, abs(reference.value)) or case.name in WIDE
+    assert reference.error <= 1e-6 * max(1.0, abs(reference.value))
     assert all(reference.upper < local for local in case.local_costs)
     if case.costate0 is not None:
         assert len(case.costate0) == ocp.model.nx
-
-
-# Error bars wider than 1e-6: computed on grids only.
-WIDE = {"rayleigh-constrained"}
 
 
 @each

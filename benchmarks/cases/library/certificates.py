@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+# Of the file: 1 had one set of versions for all entries.
+FORMAT = 2
 COMMITTED = Path(__file__).parents[2] / "data" / "certificates.json"
 
 
@@ -15,27 +17,38 @@ class Certificates:
     """What is on file.
 
     Attributes:
-        versions: of what computed.
-        entries: by name of the case, as ``Certificate.as_dict`` has them.
+        entries: by name of the case, as ``Certificate.as_dict`` has them, and under ``versions``
+            of what computed each.
     """
 
-    versions: Mapping[str, str] = field(default_factory=dict)
     entries: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def read(cls, file: Path) -> "Certificates":
         """Read a file; nothing where there is none.
 
+        A file of the first format has the versions of its last run alone, and nobody knows
+        of which entries they are: there every entry gets them, marked as those of the file.
+
         Raises:
-            ValueError: if it is no file of certificates.
+            ValueError: if it is no file of certificates, or of a later format.
         """
         if not file.exists():
             return cls()
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            return cls(content["versions"], content["cases"])
-        except (OSError, ValueError, KeyError, TypeError) as reason:
+            written, cases = content.get("format", 1), content["cases"]
+            if written == 1:
+                old = {**content["versions"], "of": "the file's last run"}
+                return cls({name: {**entry, "versions": old} for name, entry in cases.items()})
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as reason:
             raise ValueError(f"{file} is no file of certificates: {reason!r}") from None
+        if written != FORMAT:
+            raise ValueError(f"{file} has format {written}; this version reads 1 and {FORMAT}")
+        lacking = [name for name, entry in cases.items() if "versions" not in entry]
+        if lacking:
+            raise ValueError(f"{file} is no file of certificates: '{lacking[0]}' has no versions")
+        return cls(cases)
 
     def with_(
         self, case: str, entry: Mapping[str, Any], versions: Mapping[str, str]
@@ -46,11 +59,12 @@ class Certificates:
         """
         if self.entries.get(case, {}).get("holds") and not entry["holds"]:
             return self
-        return Certificates(versions, dict(sorted({**self.entries, case: entry}.items())))
+        made = {**entry, "versions": dict(versions)}
+        return Certificates(dict(sorted({**self.entries, case: made}.items())))
 
     def write(self, file: Path) -> None:
         """Write them in one piece, so that a killed run leaves the old file or the new one."""
-        content = {"versions": dict(self.versions), "cases": dict(self.entries)}
+        content = {"format": FORMAT, "cases": dict(self.entries)}
         file.parent.mkdir(parents=True, exist_ok=True)
         draft = file.with_suffix(".new")
         draft.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,135 @@
+"""Arcs: seen in a trajectory, shot over, and compared with closed forms."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from models import (
+    double_integrator_bounded_energy,
+    double_integrator_energy,
+    double_integrator_minimum_time,
+    exponential_fuel,
+    mixed_constraint,
+    turnpike,
+)
+from ocp import OCP, Constraint, Signal, Solution, solve
+from solvers import Collocation, Verdict
+from solvers.certify.arc_conditions import ArcConditions
+from solvers.certify.arc_shooting import ArcShooting
+from solvers.certify.arcs import Arc, NoArcsError, arcs_of
+from solvers.certify.by_arcs import by_arcs
+from solvers.certify.conserved import hamiltonian_check
+from solvers.certify.estimates import NoEstimateError
+from solvers.certify.stretched import Stretched
+from tests.tolerances import DERIVATIVE, STEP
+
+
+def collocated(ocp: OCP, intervals: int = 81) -> Solution:
+    return solve(ocp, Collocation(intervals=intervals)).or_raise()
+
+
+def fewest(ocp: OCP) -> tuple[Solution, tuple[Arc, ...]]:
+    answer = collocated(ocp)
+    return answer, arcs_of(answer)
+
+
+def test_arcs_are_seen():
+    _, arcs = fewest(double_integrator_minimum_time())
+    assert [arc.names for arc in arcs] == [
+        ("upper bound of acceleration",),
+        ("lower bound of acceleration",),
+    ]
+    assert arcs[0].end == arcs[1].start == pytest.approx(0.5, abs=0.02)
+    assert (arcs[0].start, arcs[1].end) == (0.0, 1.0)
+
+
+def test_a_constraint_on_state_and_control_is_a_law():
+    answer, (arc,) = fewest(mixed_constraint())
+    assert arc.names == ("sum upper",)
+    m, (law,) = answer.problem.model, arc.laws
+    assert law is not None
+    follow = ca.Function("law", [m.x, m.t], [law.value])
+    u = [float(follow(x, t)) for x, t in zip(answer.x[1:], answer.t[1:], strict=True)]
+    np.testing.assert_allclose(u, answer.control(answer.t[1:])[:, 0], atol=1e-6)
+
+
+CLOSED = [
+    (double_integrator_minimum_time, 2.0, "indirect"),
+    (double_integrator_bounded_energy, 12.5 - 50.0 / 3.0 * np.sqrt(0.15), "indirect"),
+    (exponential_fuel, 1.0 - np.log(np.e - 1.0), "indirect"),
+    (mixed_constraint, 1.0 / np.e - 1.0, "indirect"),
+    (turnpike, 0.375, "direct"),
+]
+
+
+@pytest.mark.parametrize(("build", "optimum", "kind"), CLOSED)
+def test_closed_forms(build, optimum, kind):
+    """Where the control is singular on an arc, the direct method speaks."""
+    estimate = by_arcs(collocated(build()))
+    assert estimate.method.startswith(kind)
+    assert abs(estimate.cost - optimum) <= max(estimate.error, 1e-10)
+    assert estimate.violation <= 1e-8
+    limit = 1e-9 if kind == "indirect" else 1e-6
+    assert hamiltonian_check(estimate.solution, limit).verdict is Verdict.HOLDS
+
+
+def test_the_jacobian_of_the_equations():
+    answer, arcs = fewest(double_integrator_bounded_energy())
+    shooting = ArcShooting(ArcConditions(answer, arcs), nodes=2, steps=4)
+    value, slope = shooting.system
+    w = shooting.guess()
+    assert value.numel_out(0) == len(w)
+    for column in (0, 5, len(w) - 3, len(w) - 1):
+        step = np.zeros_like(w)
+        step[column] = STEP
+        difference = np.array(value(w + step) - value(w - step)).ravel() / (2 * STEP)
+        np.testing.assert_allclose(
+            np.array(slope(w))[:, column], difference, rtol=DERIVATIVE, atol=DERIVATIVE
+        )
+
+
+def test_arcs_in_the_wrong_order_are_no_extremal():
+    answer, (push, brake) = fewest(double_integrator_minimum_time())
+    wrong = (Arc(0.0, 0.5, brake.laws), Arc(0.5, 1.0, push.laws))
+    shooting = ArcShooting(ArcConditions(answer, wrong))
+    found = shooting.solve(shooting.guess(), 1e-10)
+    lengths = found.x[-4:-2]
+    assert not found.converged or lengths.min() < 0.0
+
+
+def test_a_multiplier_of_the_wrong_sign_is_seen():
+    answer, arcs = fewest(double_integrator_minimum_time())
+    shooting = ArcShooting(ArcConditions(answer, arcs))
+    trajectory = shooting.trajectory(shooting.solve(shooting.guess(), 1e-10).x)
+    assert shooting.wrong_signs(trajectory) <= 1e-12
+    turned = trajectory.with_(costate=-trajectory.costate)
+    assert shooting.wrong_signs(turned) > 0.1
+
+
+def test_what_is_not_said_is_said():
+    with pytest.raises(NoEstimateError, match="no control is at a bound"):
+        by_arcs(collocated(double_integrator_energy()))
+    answer, arcs = fewest(turnpike())
+    with pytest.raises(NoArcsError, match="not quadratic in u"):
+        ArcConditions(answer, arcs)
+
+
+def test_signals_and_free_starts_are_refused():
+    answer, arcs = fewest(double_integrator_minimum_time())
+    ocp = answer.problem
+    parts = {
+        "model": ocp.model,
+        "x0": ocp.x0,
+        "horizon": ocp.horizon,
+        "running_cost": ocp.running_cost,
+        "control_bounds": ocp.control_bounds,
+    }
+    signal = Signal("w", ca.SX.sym("w"), np.zeros(3))
+    followed = answer.with_(problem=OCP(name="w", parameters=(signal,), **parts))
+    for refusing in (ArcConditions, Stretched):
+        with pytest.raises(NoArcsError, match="signals"):
+            refusing(followed, arcs)
+    start = Constraint("start", ocp.model.x, 0.0, 0.0, at="initial")
+    free = answer.with_(problem=OCP(name="free", constraints=(start,), **parts))
+    with pytest.raises(NoArcsError, match="start is free"):
+        ArcConditions(free, arcs)
