@@ -132,10 +132,10 @@ def enumerate_extremals(
     guesses = [_guess(motions, start, row, data.x0) for row in ends]
     solver = solver or IndirectShooting(_SEGMENTS, _FINE_STEPS, max_steps=_NEWTON_STEPS)
     found = list(_exact(solver.build(ocp), data, guesses))
-    return _enumeration(found, scans)
+    return _enumeration(found, scans, Work(rollouts=motions.number))
 
 
-def _enumeration(found: list[Solution], scans: tuple[Scan, ...]) -> Enumeration:
+def _enumeration(found: list[Solution], scans: tuple[Scan, ...], scanning: Work) -> Enumeration:
     """Return the distinct extremals among those found, the cheapest first."""
     solutions = _distinct([solution for solution in found if solution.status.is_success])
     judged = np.array([evaluate(solution).cost for solution in solutions])
@@ -147,7 +147,7 @@ def _enumeration(found: list[Solution], scans: tuple[Scan, ...]) -> Enumeration:
         unresolved=sum(scan.unresolved for scan in scans),
         lost=sum(not solution.status.is_success for solution in found),
         iterations=sum(solution.iterations for solution in found),
-        work=sum((solution.work for solution in found), Work(rollouts=motions.number)),
+        work=sum((solution.work for solution in found), scanning),
     )
 
 
