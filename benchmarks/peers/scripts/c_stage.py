@@ -59,5 +59,5 @@ def compiled(code: str) -> dict[str, Compiled]:
     words = ["cc", "-O3", "-march=native", "-shared", "-fPIC", str(source), "-o", str(library)]
     subprocess.run([*words, "-lm"], check=True)
     loaded = ctypes.CDLL(str(library.resolve()))
-    names = ("stage", "stage_slopes", "terminal", "terminal_slopes")
+    names = ("stage", "stage_slopes", "stage_bend", "terminal", "terminal_slopes")
     return {name: Compiled(loaded, name) for name in names}
