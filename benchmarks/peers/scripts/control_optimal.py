@@ -13,6 +13,7 @@ import scipy
 from c_stage import compiled
 from control import optimal
 from scipy.optimize import Bounds, NonlinearConstraint
+from slopes import RollOut
 from wire import end_state, serve
 
 _ITERATIONS = 500
@@ -31,6 +32,7 @@ class SingleShooting:
         self.remark = "starts from controls alone"
         self._job, self._n, self._p = job, job["N"], np.zeros((job["N"] + 1, job["np"]))
         self._functions, self._x0 = compiled(job["c"]), np.zeros(job["nx"])
+        self._run = RollOut(self._functions)
         is_ours = job["setting"] == "our derivatives"
         system = control.nlsys(
             self._next, None, inputs=job["nu"], states=job["nx"] + 1, dt=job["interval"]
@@ -100,43 +102,23 @@ class SingleShooting:
         rows, wanted = list(end), np.array(list(end.values()))
         return [NonlinearConstraint(lambda z, u: z[rows], wanted, wanted)] if rows else []
 
-    def _along(self, coefficients: np.ndarray) -> tuple[list[np.ndarray], list[list]]:
-        """States, and what ``stage_slopes`` says at the nodes."""
-        u = coefficients.reshape(self._job["nu"], -1)
-        x, slopes = [self._x0], []
-        for k, now in enumerate(self._p[:-1]):
-            slopes.append([b.copy() for b in self._functions["stage_slopes"](x[k], u[:, k], now)])
-            x.append(self._functions["stage"](x[k], u[:, k], now)[0][:, 0].copy())
-        return x, slopes
-
     def _gradient(self, coefficients: np.ndarray) -> np.ndarray:
-        """Of the cost by all controls: one run ahead, one back."""
-        x, slopes = self._along(coefficients)
-        gradient = np.zeros((self._job["nu"], self._n + 1))
-        adjoint = self._functions["terminal_slopes"](x[-1], self._p[-1])[0][:, 0].copy()
-        for k in reversed(range(self._n)):
-            on_x, on_u, cost_x, cost_u = slopes[k][:4]
-            gradient[:, k] = cost_u[:, 0] + on_u.T @ adjoint
-            adjoint = cost_x[:, 0] + on_x.T @ adjoint
-        return gradient.ravel()
+        return self._run.gradient(self._x0, self._controls(coefficients), self._p).ravel()
+
+    def _sensitivities(self, coefficients: np.ndarray) -> np.ndarray:
+        found = self._run.sensitivities(self._x0, self._controls(coefficients), self._p)
+        return found.reshape(*found.shape[:2], -1)
+
+    def _controls(self, coefficients: np.ndarray) -> np.ndarray:
+        return coefficients.reshape(self._job["nu"], -1)
 
     def _slopes(self) -> list[tuple[np.ndarray, Callable]]:
         """Rows and Jacobian: of the bounds of states, and of the prescribed end."""
         rows, end = self._bounded(), np.array(list(end_state(self._job)), dtype=int)
         return [
-            (rows, lambda u: np.vstack([state[rows] for state in self._sensitivities(u)])),
+            (rows, lambda u: np.concatenate(self._sensitivities(u)[:, rows])),
             (end, lambda u: self._sensitivities(u)[-1][end]),
         ]
-
-    def _sensitivities(self, coefficients: np.ndarray) -> list[np.ndarray]:
-        """Of the states at the nodes by all controls; columns as its coefficients are."""
-        nx, nu = self._job["nx"], self._job["nu"]
-        found = [np.zeros((nx, nu, self._n + 1))]
-        for k, slopes in enumerate(self._along(coefficients)[1]):
-            after = np.tensordot(slopes[0], found[k], axes=1)
-            after[:, :, k] += slopes[1]
-            found.append(after)
-        return [state.reshape(nx, -1) for state in found]
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from importlib.metadata import version
 import casadi
 import nmpyc
 import numpy as np
-from replay import function
+from replay import function, reads_parameters
 from wire import end_state, serve
 
 
@@ -67,12 +67,6 @@ class RecedingHorizon:
     def plan(self) -> dict:
         """Return the last answer."""
         return {"x": self._x, "u": self._u, "status": self._status}
-
-
-def reads_parameters(tape: dict) -> bool:
-    """Return whether a tape reads its last argument: time and parameters."""
-    last = len(tape["inputs"]) - 1
-    return any(name == "input" and given[0] == last for name, _, given in tape["code"])
 
 
 def _bounds(job: dict) -> nmpyc.constraints:

@@ -10,14 +10,13 @@ from importlib.metadata import version
 import numpy as np
 import ssqpy
 from c_stage import Compiled, compiled
+from slopes import projected
 from ssqpy.model.constraints import StageConstraints
 from ssqpy.model.costs import StageCost
 from ssqpy.model.dynamics import StageDynamics
-from wire import end_state, serve
+from wire import bounds_along, serve
 
 _ITERATIONS = {"HPIPM": 300, "ADMM": 100}
-# Smallest curvature that is left by a projection.
-_LEAST = 1e-6
 
 
 class _Stage:
@@ -68,12 +67,6 @@ class _Stage:
     def _blocks(self, whole: np.ndarray) -> list[np.ndarray]:
         n = self._nx
         return [np.asfortranarray(b) for b in (whole[:n, :n], whole[:n, n:], whole[n:, n:])]
-
-
-def projected(hessian: np.ndarray) -> np.ndarray:
-    """Return the nearest symmetric matrix with no eigenvalue below a small positive one."""
-    values, vectors = np.linalg.eigh(hessian)
-    return (vectors * np.maximum(values, _LEAST)) @ vectors.T
 
 
 class _Dynamics(StageDynamics):
@@ -166,21 +159,6 @@ class _Bounds(StageConstraints):
 
     def hessprod_uu(self, x, u, mu):
         return np.zeros((len(u), len(u)), order="F")
-
-
-def bounds_along(job: dict) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Lower and upper bounds of (x, u) at the nodes; none of the first x, no u at the end."""
-    along = []
-    for k in range(job["N"] + 1):
-        sides = []
-        for side, none in (("lower", -np.inf), ("upper", np.inf)):
-            x = np.array(job[f"x_{side}"]) if k > 0 else np.full(job["nx"], none)
-            u = np.array(job[f"u_{side}"] if k < job["N"] else [])
-            for i, value in end_state(job).items() if k == job["N"] else ():
-                x[i] = value
-            sides.append(np.append(x, u))
-        along.append((sides[0], sides[1]))
-    return along
 
 
 class StagewiseQuadratic:

@@ -1,6 +1,7 @@
 """``python -m benchmarks peers``."""
 
 import json
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,6 @@ from benchmarks.peers import (
     Environment,
     InstallFailed,
     NotInstalled,
-    Peer,
     Report,
     markdown,
     quicker,
@@ -137,12 +137,12 @@ def test_the_page_shows_the_committed_results():
     assert markdown(Report.read(DATA)).strip() in page.read_text(encoding="utf-8")
 
 
-def test_a_peer_without_an_adapter_is_said(capsys):
-    assert not Peer("p", "a package", "").has_adapter
-    missing = [peer.name for peer in PEERS if not peer.has_adapter]
-    for name in missing:
-        assert main(["peers", "install", name]) == 0
-        assert "adapter is not written" in capsys.readouterr().err
+@pytest.mark.parametrize("name", ["control", "ssqp", "nmpyc"])
+def test_what_is_missing_is_said_for_every_peer(name, capsys, empty_cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("benchmarks.peers.compare"), "own_contenders", lambda _: [])
+    words = ["peers", "run", "--peer", name, "--problem", "linear", "--cold", "1"]
+    assert main([*words, "--out", str(tmp_path / "r.json")]) == 2
+    assert f"python -m benchmarks peers install {name}" in capsys.readouterr().err
 
 
 @pytest.mark.slow
