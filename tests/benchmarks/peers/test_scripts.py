@@ -42,12 +42,13 @@ def told():
 def functions(told, tmp_path_factory):
     if shutil.which("cc") is None:
         pytest.skip("no C compiler")
-    patch = pytest.MonkeyPatch()
-    patch.chdir(tmp_path_factory.mktemp("c"))
-    try:
-        return import_module("c_stage").compiled(told["c"])
-    finally:
-        patch.undo()
+    compiled, folder = import_module("c_stage").compiled, tmp_path_factory.mktemp("c")
+    first = compiled(told["c"], folder)
+    kept = list(folder.iterdir())
+    compiled(told["c"], folder)
+    assert len(kept) == 1
+    assert list(folder.iterdir()) == kept, "what is there is not compiled again"
+    return first
 
 
 def point():
