@@ -15,7 +15,6 @@ from benchmarks.peers import (
     BadResults,
     Environment,
     InstallFailed,
-    Peer,
     Report,
     compare,
     markdown,
@@ -54,7 +53,7 @@ def _run(options: Namespace, console: Console) -> int:
 def _list(console: Console) -> int:
     table = Table("peer", "installed", "what")
     for peer in PEERS:
-        table.add_row(peer.name, _state(peer), peer.about)
+        table.add_row(peer.name, "yes" if Environment(peer).is_installed else "no", peer.about)
     console.print(table)
     problems = Table("problem", "what")
     for job in JOBS:
@@ -63,15 +62,9 @@ def _list(console: Console) -> int:
     return 0
 
 
-def _state(peer: Peer) -> str:
-    if not peer.has_adapter:
-        return "adapter not written"
-    return "yes" if Environment(peer).is_installed else "no"
-
-
 def _install(names: list[str], console: Console) -> int:
     failed = False
-    for peer in _with_adapter(named(PEERS, [] if names == ["all"] else names, "peer")):
+    for peer in named(PEERS, [] if names == ["all"] else names, "peer"):
         try:
             Environment(peer).install()
             console.print(f"{peer.name}: installed")
@@ -81,18 +74,10 @@ def _install(names: list[str], console: Console) -> int:
     return int(failed)
 
 
-def _with_adapter(peers: list[Peer]) -> list[Peer]:
-    """Leave out, and name, those that nobody has written an adapter for."""
-    for peer in peers:
-        if not peer.has_adapter:
-            print(f"{peer.name}: its adapter is not written yet", file=sys.stderr)
-    return [peer for peer in peers if peer.has_adapter]
-
-
 def _compare(options: Namespace, console: Console) -> int:
     """Return 0, 2 if a peer that was asked for by name is not installed, 1 if one failed."""
     jobs = named(JOBS, options.problem, "problem")
-    wanted = _with_adapter(named(PEERS, options.peer, "peer"))
+    wanted = named(PEERS, options.peer, "peer")
     missing = [peer for peer in wanted if not Environment(peer).is_installed]
     for peer in missing:
         print(

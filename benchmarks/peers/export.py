@@ -100,18 +100,25 @@ def _extremal(job: Job) -> tuple[dict | None, str]:
 
 
 def _c_code(stage: ca.Function, terminal: ca.Function) -> str:
-    """C of both functions and of their first and second derivatives, all dense."""
+    """C of both functions and of their derivatives, all dense.
+
+    ``stage_slopes`` has the second derivatives of the cost, ``stage_bend`` those of the state
+    after the interval, weighted.
+    """
     x, u, p = stage.sx_in()
     after, cost = stage(x, u, p)
-    hess, gradient = ca.hessian(cost, ca.vertcat(x, u))
     nx = x.numel()
+    gradient = ca.gradient(cost, ca.vertcat(x, u))
     slopes = [ca.jacobian(after, x), ca.jacobian(after, u), gradient[:nx], gradient[nx:]]
-    curvatures = [hess[:nx, :nx], hess[:nx, nx:], hess[nx:, nx:]]
+    weights = ca.SX.sym("weights", nx)
     end = terminal(x, p)
     end_hess, end_gradient = ca.hessian(end, x)
     functions = (
         ca.Function("stage", [x, u, p], _dense([after, cost])),
-        ca.Function("stage_slopes", [x, u, p], _dense([*slopes, *curvatures])),
+        ca.Function("stage_slopes", [x, u, p], _dense([*slopes, *_curvatures(cost, x, u)])),
+        ca.Function(
+            "stage_bend", [x, u, p, weights], _dense(_curvatures(ca.dot(weights, after), x, u))
+        ),
         ca.Function("terminal", [x, p], _dense([end])),
         ca.Function("terminal_slopes", [x, p], _dense([end_gradient, end_hess])),
     )
@@ -119,6 +126,12 @@ def _c_code(stage: ca.Function, terminal: ca.Function) -> str:
     for function in functions:
         generator.add(function)
     return generator.dump()
+
+
+def _curvatures(value: ca.SX, x: ca.SX, u: ca.SX) -> list[ca.SX]:
+    """Second derivatives of a number by (x, x), (x, u), (u, u)."""
+    hess, nx = ca.hessian(value, ca.vertcat(x, u))[0], x.numel()
+    return [hess[:nx, :nx], hess[:nx, nx:], hess[nx:, nx:]]
 
 
 def _dense(expressions: list[ca.SX]) -> list[ca.SX]:

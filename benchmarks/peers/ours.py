@@ -15,16 +15,24 @@ def own_contenders(job: Job) -> list[OwnContender]:
             for backend, form in _LINEAR
         ]
     n, tolerance = job.intervals, job.tolerance
-    newton = StagewiseNewton(n, tolerance=tolerance, compiled=True)
-    return [
+    shooting = [
         OwnContender(
-            f"MultipleShooting, {backend}",
-            MultipleShooting(n, backend=backend, tolerance=tolerance, compiled=True),
-            "stages compiled",
+            f"MultipleShooting, {backend}{how}",
+            MultipleShooting(n, backend=backend, tolerance=tolerance, compiled=not how),
+            "" if how else "stages compiled",
         )
-        for backend in ("ipopt", "fatrop")
-    ] + [OwnContender("StagewiseNewton", newton, "stages and recursion compiled")]
+        for backend, how in _SHOOTING
+    ]
+    newton = StagewiseNewton(n, tolerance=tolerance, compiled=True)
+    return [*shooting, OwnContender("StagewiseNewton", newton, "stages and recursion compiled")]
 
+
+# Interpreted as well, as do-mpc, rockit and nmpyc are.
+_SHOOTING: tuple[tuple[Literal["ipopt", "fatrop"], str], ...] = (
+    ("ipopt", ""),
+    ("ipopt", ", interpreted"),
+    ("fatrop", ""),
+)
 
 _LINEAR: tuple[tuple[str, Literal["sparse", "condensed"]], ...] = (
     ("osqp", "sparse"),

@@ -13,7 +13,7 @@ class Peer:
     Args:
         name: what a user types; also the name of its environment.
         about: the package and the method in one line.
-        script: file of ``scripts/``; empty: it is known, and no adapter was written.
+        script: file of ``scripts/``.
         requirements: file of ``requirements/`` with exact versions; empty: it runs in our own
             environment, since all that it needs is there.
         settings: ways to run it, a row in the table each.
@@ -26,11 +26,6 @@ class Peer:
     requirements: str = ""
     settings: tuple[str, ...] = ("",)
     folder: Path = _HERE / "scripts"
-
-    @property
-    def has_adapter(self) -> bool:
-        """Whether it can be run."""
-        return bool(self.script)
 
     @property
     def wanted(self) -> str:
@@ -74,7 +69,24 @@ PEERS: tuple[Peer, ...] = (
         "crocoddyl_ddp.py",
         "crocoddyl.txt",
     ),
-    Peer("control", "python-control's optimal module, on scipy's SLSQP", "", "control.txt"),
-    Peer("ssqp", "SQP along the stages, ADMM within", "", "ssqp.txt"),
-    Peer("nmpyc", "nonlinear MPC on CasADi and IPOPT", "", "nmpyc.txt"),
+    Peer(
+        "control",
+        "python-control: single shooting, SLSQP of scipy; its setting is where slopes come from",
+        "control_optimal.py",
+        "control.txt",
+        ("our derivatives", "differences"),
+    ),
+    Peer(
+        "ssqp",
+        "SQP along the stages, HPIPM or ADMM within",
+        "ssqp_qp.py",
+        "ssqp.txt",
+        ("HPIPM", "HPIPM, projected", "ADMM, projected"),
+    ),
+    Peer(
+        "nmpyc",
+        "direct, IPOPT, on our RK4 step as a discrete system",
+        "nmpyc_direct.py",
+        "nmpyc.txt",
+    ),
 )

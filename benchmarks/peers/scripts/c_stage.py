@@ -1,13 +1,18 @@
 """The job's functions as machine code, called with arrays, for peers that take no expressions."""
 
 import ctypes
+import hashlib
+import platform
 import subprocess
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 _INTEGERS = ctypes.POINTER(ctypes.c_longlong)
 _REALS = ctypes.POINTER(ctypes.c_double)
+_COMPILE = ("cc", "-O3", "-march=native", "-shared", "-fPIC")
 
 
 class Compiled:
@@ -52,12 +57,29 @@ class Compiled:
         return np.zeros((sparsity[0], sparsity[1]), order="F")
 
 
-def compiled(code: str) -> dict[str, Compiled]:
-    """Build the library of a job in the folder of this process and return its functions."""
-    source, library = Path("job.c"), Path("job.so")
-    source.write_text(code, encoding="utf-8")
-    words = ["cc", "-O3", "-march=native", "-shared", "-fPIC", str(source), "-o", str(library)]
-    subprocess.run([*words, "-lm"], check=True)
+def compiled(code: str, folder: Path | None = None) -> dict[str, Compiled]:
+    """Return the functions of a job.
+
+    Args:
+        code: its source.
+        folder: where the library is kept, for the next setting and the next run; None: in the
+            environment of the peer.
+    """
+    folder = folder or Path(sys.prefix) / "compiled"
+    key = " ".join([platform.node(), *_COMPILE, code])
+    library = folder / f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
+    if not library.exists():
+        folder.mkdir(exist_ok=True)
+        _compile(code, library)
     loaded = ctypes.CDLL(str(library.resolve()))
-    names = ("stage", "stage_slopes", "terminal", "terminal_slopes")
+    names = ("stage", "stage_slopes", "stage_bend", "terminal", "terminal_slopes")
     return {name: Compiled(loaded, name) for name in names}
+
+
+def _compile(code: str, library: Path) -> None:
+    """Build it beside its place, since others may do the same."""
+    with TemporaryDirectory(dir=library.parent) as near:
+        source, new = Path(near) / "job.c", Path(near) / "job.so"
+        source.write_text(code, encoding="utf-8")
+        subprocess.run([*_COMPILE, str(source), "-o", str(new), "-lm"], check=True)
+        new.replace(library)

@@ -79,3 +79,9 @@ def function(tape: dict, casadi: Any) -> Any:
     """Return it as a Function of scalars, which can be called with MX or numbers."""
     inputs = [casadi.SX.sym(f"i{k}", size) for k, size in enumerate(tape["inputs"])]
     return casadi.Function("replayed", inputs, with_casadi(tape, inputs, casadi))
+
+
+def reads_parameters(tape: dict) -> bool:
+    """Return whether a tape reads its last argument: time and parameters."""
+    last = len(tape["inputs"]) - 1
+    return any(name == "input" and given[0] == last for name, _, given in tape["code"])

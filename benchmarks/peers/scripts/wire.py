@@ -91,3 +91,21 @@ def refuse_bounds_of_states(job: dict) -> None:
 def end_state(job: dict) -> dict[int, float]:
     """Return the states that are prescribed at the end, by index."""
     return {i: value for i, value in enumerate(job["x_end"] or []) if value is not None}
+
+
+def bounds_along(job: dict) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return lower and upper bounds of (x, u) at the nodes.
+
+    The first state is given, so that it has none; the end has no control.
+    """
+    along = []
+    for k in range(job["N"] + 1):
+        sides = []
+        for side, none in (("lower", -np.inf), ("upper", np.inf)):
+            x = np.array(job[f"x_{side}"]) if k > 0 else np.full(job["nx"], none)
+            u = np.array(job[f"u_{side}"] if k < job["N"] else [])
+            for i, value in end_state(job).items() if k == job["N"] else ():
+                x[i] = value
+            sides.append(np.append(x, u))
+        along.append((sides[0], sides[1]))
+    return along

@@ -1,6 +1,7 @@
 """``python -m benchmarks peers``."""
 
 import json
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,13 @@ from benchmarks.peers import (
     Environment,
     InstallFailed,
     NotInstalled,
-    Peer,
     Report,
     markdown,
     quicker,
     tables,
 )
 
-DATA = Path(benchmarks.__file__).parent / "data" / "peers.json"
+DATA = Path(benchmarks.__file__).parent / "data"
 
 
 @pytest.fixture
@@ -134,17 +134,18 @@ def test_a_report_comes_back_and_a_bad_one_is_refused(tmp_path, capsys):
         Report.read(tmp_path / "none.json")
 
 
-def test_the_page_shows_the_committed_results():
-    page = DATA.parent.parent.parent / "docs" / "peers.md"
-    assert markdown(Report.read(DATA)).strip() in page.read_text(encoding="utf-8")
+@pytest.mark.parametrize("run", ["peers.json", "more_peers.json"])
+def test_the_page_shows_the_committed_results(run):
+    page = DATA.parent.parent / "docs" / "peers.md"
+    assert markdown(Report.read(DATA / run)).strip() in page.read_text(encoding="utf-8")
 
 
-def test_a_peer_without_an_adapter_is_said(capsys):
-    assert not Peer("p", "a package", "").has_adapter
-    missing = [peer.name for peer in PEERS if not peer.has_adapter]
-    for name in missing:
-        assert main(["peers", "install", name]) == 0
-        assert "adapter is not written" in capsys.readouterr().err
+@pytest.mark.parametrize("name", ["control", "ssqp", "nmpyc"])
+def test_what_is_missing_is_said_for_every_peer(name, capsys, empty_cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("benchmarks.peers.compare"), "own_contenders", lambda _: [])
+    words = ["peers", "run", "--peer", name, "--problem", "linear", "--cold", "1"]
+    assert main([*words, "--out", str(tmp_path / "r.json")]) == 2
+    assert f"python -m benchmarks peers install {name}" in capsys.readouterr().err
 
 
 @pytest.mark.slow
