@@ -9,6 +9,7 @@ from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.expressions import instance, numbers, positive, whole
 from ocp.functions import Functions
+from ocp.given_start import start_fault
 from ocp.guess import Guess
 from ocp.hamiltonian import Hamiltonian, hamiltonian
 from ocp.integrate import RK4, Euler, Integrator, Midpoint, Stage, interpolate
@@ -119,6 +120,7 @@ __all__ = [
     "rows_of",
     "saturated_lqr",
     "solve",
+    "start_fault",
     "stationary",
     "symbol_kind",
     "terminal_set",

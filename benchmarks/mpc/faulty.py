@@ -104,9 +104,9 @@ class Hindered:
         """Of the MPC [s]."""
         return self.mpc.delay
 
-    def reset(self) -> None:
+    def reset(self, acting: np.ndarray | None = None) -> None:
         """Reset the MPC."""
-        self.mpc.reset()
+        self.mpc.reset(acting)
 
     def step(self, x: np.ndarray, t: float) -> Decision:
         """Decide, late or not."""

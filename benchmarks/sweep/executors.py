@@ -89,10 +89,13 @@ def _dask(address: str, patience: float, arrivals: Arrivals) -> Iterator[tuple[E
     """
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
         from distributed.scheduler import KilledWorker
     except ModuleNotFoundError as missing:
         raise SweepError("Dask is not installed: pip install 'ocp-toolkit[dask]'") from missing
     try:
+        # By itself a client would find out half made, and block when it is collected.
+        get_address_host_port(address)
         client = Client(address, timeout=patience, set_as_default=False)
     except (OSError, ValueError) as unreachable:
         raise SweepError(f"no Dask scheduler answers at {address}") from unreachable

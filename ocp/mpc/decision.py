@@ -95,8 +95,8 @@ class Controller(Protocol):
         """Time from measurement to effect [s], a multiple of the sampling interval."""
         ...
 
-    def reset(self) -> None:
-        """Forget everything about earlier steps."""
+    def reset(self, acting: np.ndarray | None = None) -> None:
+        """Forget everything about earlier steps; ``acting`` acts until the first decision does."""
         ...
 
     def step(self, x: np.ndarray, t: float) -> Decision:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance, positive
+from ocp.expressions import instance, numbers, positive
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
@@ -102,7 +102,7 @@ class MPC:
         self._check()
         self.backup_law = backup_of(self.backup, self.ocp, self.dt, self.applied)
         self.steps_late = late_steps(self.delay, self.dt)
-        self.memory = Memory()
+        self.reset()
         self._ladder = Ladder(
             ocp=self.ocp,
             program=self._fastest.build(self.ocp),
@@ -149,9 +149,17 @@ class MPC:
         """Whether the solver's own answers depend on the runs before."""
         return self._ladder.program.remembers
 
-    def reset(self) -> None:
-        """Forget the last plan and input."""
-        self.memory = Memory()
+    def reset(self, acting: ArrayLike | None = None) -> None:
+        """Forget the last plan and input.
+
+        Args:
+            acting: input that acts until the first decision does (m,), so that a delay is
+                compensated from the first step on; None: nothing is known of it.
+        """
+        size = self.applied.size(self.ocp)
+        self.acting = None if acting is None else numbers(acting, size, "MPC: acting input")
+        known = () if self.acting is None else (self.acting,) * self.steps_late
+        self.memory = Memory(pending=known)
 
     def step(
         self,

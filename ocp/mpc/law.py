@@ -33,7 +33,7 @@ class Law:
         """Return the law that feeds a plan forward, whatever the state; its last input is held."""
         return cls(law=lambda x, t: controls(plan, t))
 
-    def reset(self) -> None:
+    def reset(self, acting: np.ndarray | None = None) -> None:
         """Do nothing: a law has no memory."""
 
     def step(self, x: np.ndarray, t: float) -> Decision:

@@ -28,13 +28,15 @@ def closed_loop(
     dt: float,
     seed: int = 0,
     initial_input: ArrayLike | None = None,
+    head_start: bool = False,
     sensors: Fault | None = None,
     watch: Watch | None = None,
 ) -> Rollout:
     """Run a controller on a plant.
 
-    The input decided from the measurement at t acts from t + ``controller.delay`` on, until
-    then the initial one. Where the controller refuses, the rollout ends and says why.
+    The input decided from the measurement at t acts from t + ``controller.delay`` on. Until the
+    first one does, the initial input acts; with a head start none is needed. Where the controller
+    refuses, the rollout ends and says why.
 
     Args:
         controller: ``MPC``, ``Law``, or whatever decides.
@@ -44,6 +46,9 @@ def closed_loop(
         dt: sampling interval [s].
         seed: of noise and jitter.
         initial_input: acts during the delay at the start (m,); default: zero, within bounds.
+        head_start: the controller is asked from t = -delay on, while the plant is kept at x0, so
+            that its first input acts from t = 0 on. It should rest there under the initial input,
+            or a delay that is compensated predicts what does not happen.
         sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
         watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is.
 
@@ -56,36 +61,48 @@ def closed_loop(
     steps = round(duration / dt)
     if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
         raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
-    controller.reset()
-    journal = _Journal(plant.ocp, plant.started(x0, seed))
     box, m = plant.ocp.control_bounds, plant.ocp.model.nu
     first = box.clip(np.zeros(m))
     if initial_input is not None:
         first = numbers(initial_input, m, "closed loop: initial_input")
-    ahead = [first] * late_steps(controller.delay, dt)
-    for _ in range(steps):
-        measured = journal.running.measure()
-        told = sensors(measured, journal.running.t) if sensors else measured
+    controller.reset(first)
+    journal, late = _Journal(plant.ocp, plant.started(x0, seed)), late_steps(controller.delay, dt)
+    ahead = [] if head_start else [first] * late
+    for k in range(-late if head_start else 0, steps):
+        measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
+        told = sensors(measured, t) if sensors else measured
         try:
-            decision = controller.step(told, journal.running.t)
+            decision = _decided(controller, told, t, plant.ocp, watch)
         except ControlRefused as refusal:
-            if watch:
-                watch(told, refusal)
             journal.ended = str(refusal)
             break
-        if decision.input.shape != (m,):
-            raise ProblemError(
-                f"closed loop: the controller sends {decision.input.size} inputs, "
-                f"the plant '{plant.ocp.name}' takes {m}"
-            )
-        if watch:
-            watch(told, decision)
         ahead.append(decision.input)
-        journal.advance(told, decision, ahead.pop(0), dt)
+        if k >= 0:
+            journal.advance(told, decision, ahead.pop(0), dt)
         if not np.isfinite(journal.running.x).all():
             journal.ended = "the plant's state blows up"
             break
     return journal.rollout()
+
+
+def _decided(
+    controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: Watch | None
+) -> Decision:
+    """Ask the controller, and tell who watches what it says, or that it refuses."""
+    try:
+        decision = controller.step(told, t)
+    except ControlRefused as refusal:
+        if watch:
+            watch(told, refusal)
+        raise
+    if decision.input.shape != (plant.model.nu,):
+        raise ProblemError(
+            f"closed loop: the controller sends {decision.input.size} inputs, "
+            f"the plant '{plant.name}' takes {plant.model.nu}"
+        )
+    if watch:
+        watch(told, decision)
+    return decision
 
 
 @dataclass(eq=False)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from struct import Struct, pack
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -88,9 +88,17 @@ class Record(NamedTuple):
     time_used: float
 
 
-def header(problem: str, solver: str, parameters: Sequence[str]) -> bytes:
-    """Return the first line of a file: whose it is."""
-    said = {"format": _FORMAT, "problem": problem, "solver": solver, "parameters": [*parameters]}
+def header(
+    problem: str, solver: str, parameters: Sequence[str], acting: np.ndarray | None
+) -> bytes:
+    """Return the first line of a file: whose it is, and what acted before the first decision."""
+    said = {
+        "format": _FORMAT,
+        "problem": problem,
+        "solver": solver,
+        "parameters": [*parameters],
+        "acting": None if acting is None else acting.tolist(),
+    }
     return json.dumps(said).encode() + b"\n"
 
 
@@ -128,7 +136,7 @@ def packed(measured: np.ndarray, step: Attempt, plan: Solution | None) -> bytes:
     return head + body
 
 
-def read_header(file: BinaryIO, path: str | Path) -> dict[str, str | list[str]]:
+def read_header(file: BinaryIO, path: str | Path) -> dict[str, Any]:
     """Return what the first line says.
 
     Raises:

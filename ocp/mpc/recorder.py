@@ -11,7 +11,6 @@ import numpy as np
 from ocp.errors import ProblemError
 from ocp.mpc.decision import ControlRefused, Decision
 from ocp.mpc.driver import MPC
-from ocp.mpc.memory import Memory
 from ocp.mpc.record import Record, header, packed, read_header, records
 from ocp.solution import Solution
 
@@ -34,8 +33,7 @@ class FlightRecorder:
         self._mpc, self.path = mpc, Path(path)
         self._last: Solution | None = None
         self._file: BinaryIO = self.path.open("wb")
-        names = [entry.name for entry in mpc.ocp.parameters]
-        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names))
+        self._begun = False
 
     def __enter__(self) -> Self:
         """Return the recorder."""
@@ -55,10 +53,18 @@ class FlightRecorder:
         step = decided.attempt if isinstance(decided, ControlRefused) else decided
         if step is None:
             raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
+        if not self._begun:
+            self._begin()
         plan = self._mpc.memory.plan
         self._file.write(packed(measured, step, plan if plan is not self._last else None))
         self._file.flush()
         self._last = plan
+
+    def _begin(self) -> None:
+        """Write the first line: only the loop tells the controller what acts at first."""
+        mpc, self._begun = self._mpc, True
+        names = [entry.name for entry in mpc.ocp.parameters]
+        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names, mpc.acting))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +115,9 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
         if said[name] != own:
             raise ProblemError(f"{path} records the {name} '{said[name]}', not '{own}'")
     wanted, known = set(steps), _Known()
-    again, memory = replace(mpc, parameters=known), Memory()
+    again = replace(mpc, parameters=known)
+    again.reset(said.get("acting"))
+    memory = again.memory
     for k, record in enumerate(records(path)):
         if not wanted:
             return

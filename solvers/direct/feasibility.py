@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Box, Data, Row
+from ocp import Row
 from solvers.direct.backend import Answer
 from solvers.direct.transcribed import Transcribed
 
@@ -97,29 +97,3 @@ class Feasibility:
         program = self.transcription.program
         inputs, outputs = (program["x"], program["p"]), (program["f"], program["g"])
         return ca.Function("values", inputs, outputs)
-
-
-def start_violation(ocp: OCP, data: Data) -> tuple[float, Row | None]:
-    """Return by how much a given start violates what no grid imposes there, and which it is.
-
-    Only what the start alone decides counts: state bounds, and path constraints without the
-    control.
-    """
-    if ocp.has_free_start:
-        return 0.0, None
-    bounds = ocp.state_bounds.excess(data.x0)
-    found = [
-        (float(excess), Row(f"bound of {name}", "path", 0, 0.0, 0.0))
-        for name, excess in zip(ocp.model.x_names, bounds, strict=True)
-    ]
-    path = ocp.at("path")
-    if path:
-        low, high = (np.concatenate([getattr(c, s) for c in path]) for s in ("lower", "upper"))
-        u = ocp.control_bounds.clip(np.zeros(ocp.model.nu))
-        value = ocp.functions.path(data.x0, u, data.t0, data.values.at(0.0)[0])
-        excess = Box(low, high).excess(np.array(value).ravel())
-        alone = np.where(ocp.functions.path_on_control, 0.0, excess)
-        names = [c.name for c in path for _ in range(c.size)]
-        for name, e, lower, upper in zip(names, alone, low, high, strict=True):
-            found.append((float(e), Row(name, "path", 0, float(lower), float(upper))))
-    return max(found, key=lambda pair: pair[0])

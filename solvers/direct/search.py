@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import Data, Row, Status, Work
+from ocp import Data, Row, Status, Work, start_fault
 from solvers.direct.backend import Answer, Backend, Nlp
-from solvers.direct.feasibility import Feasibility, start_violation
+from solvers.direct.feasibility import Feasibility
 from solvers.direct.transcribed import Transcribed
 
 # Beyond this a constraint counts as violated, whatever the backend says about scaled ones.
@@ -137,10 +137,8 @@ class Search:
         violated = violation > _VIOLATED
         where = self._where(answer, data, violation, row) if violated else ""
         if answer.success and not violated:
-            excess, row = start_violation(self.transcription.ocp, data)
-            if excess > _VIOLATED:
-                where = self._where(answer, data, excess, row)
-                return Status.INFEASIBLE, f"{where}, by the given start itself"
+            if fault := start_fault(self.transcription.ocp, data):
+                return Status.INFEASIBLE, fault
             error, node = self.error(answer, data)
             if error <= self.accuracy:
                 return Status.SOLVED, ""

@@ -22,6 +22,7 @@ from ocp import (
     Status,
     instance,
     linear_quadratic,
+    start_fault,
 )
 from solvers.linear import recursion
 from solvers.linear.elastic import least_violation
@@ -156,6 +157,10 @@ class LinearMPCProgram(Program):
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
         found = answer.residuals
         z, y, status, message = self._verdict(answer, hard, qp)
+        if status is Status.SOLVED and self.softening is None:
+            # The program has no row for the start: nothing can be done about it.
+            message = start_fault(self.lq.ocp, run.data)
+            status = Status.INFEASIBLE if message else status
         x, u = self.form.trajectory(z, numbers, start)
         half = recursion.half_slopes(numbers, x, u)
         costate = self.form.costates(y, numbers, x[-1], half)

@@ -60,7 +60,7 @@ def test_the_cart_pole_is_printed(capsys) -> None:
     assert "|force| <= 12 N, |position| <= 0.6 m" in shown
     lines = [line for line in shown.splitlines() if line.startswith("│")]
     assert [line.split("│")[2].strip() for line in lines] == [
-        "ipopt", "fatrop", "shooting-5", "fatrop", "fatrop",
+        "ipopt", "fatrop", "newton", "shooting-5", "fatrop", "fatrop",
     ]  # fmt: skip
 
 

@@ -159,6 +159,19 @@ def test_measured_state_outside_its_bound_is_no_reason_to_fail():
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(form):
+    ocp, x0 = thesis_tracking(10), [2.05, -1.0]
+    outside = LinearMPC(form=form).build(ocp).run(x0=x0)
+    direct = MultipleShooting(10).build(ocp).run(x0=x0)
+    assert outside.status is direct.status is Status.INFEASIBLE
+    assert outside.message == direct.message
+    assert "by the given start itself" in outside.message
+    np.testing.assert_allclose(outside.u, direct.u, atol=1e-6)
+    soft = LinearMPC(form=form, soft=1e5).build(ocp).run(x0=x0)
+    assert soft.status is Status.SOLVED, "what may give way is no fault"
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_soft_constraints_are_exact_and_give_way_only_if_they_must(form):
     ocp = thesis_tracking(10)
     hard, soft = LinearMPC(form=form).build(ocp), LinearMPC(form=form, soft=1e5).build(ocp)

@@ -82,4 +82,6 @@ def test_slow_solvers_run_at_one_horizon() -> None:
     chosen = settings(HORIZONS)
     assert len(set(chosen)) == len(chosen)
     assert sum(s.solver in ("shooting", "schuetz-sound") for s in chosen) == 2
-    assert {s.solver for s in settings((1.0,))} == {"ipopt", "fatrop", "shooting-5"}
+    assert {s.solver for s in settings((1.0,))} == {
+        "ipopt", "fatrop", "newton", "shooting-5",
+    }  # fmt: skip

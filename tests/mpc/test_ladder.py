@@ -256,8 +256,8 @@ SHARED = MPC(
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        ({"dt": 0.0}, "dt = 0.0"),
-        ({"dt": np.nan}, "dt = nan"),
+        ({"dt": 0.0}, r"dt \[s\] = 0.0"),
+        ({"dt": np.nan}, r"dt \[s\] = nan"),
         ({"dt": 2.0}, "longer than the horizon"),
         ({"dt": 0.1, "delay": 0.15}, "no multiple"),
         ({"dt": 0.1, "delay": -0.1}, "no multiple"),

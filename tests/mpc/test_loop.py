@@ -169,12 +169,56 @@ def test_the_cost_is_that_of_the_plants_own_trajectory() -> None:
 def test_compensation_takes_the_loss_of_a_delay_away() -> None:
     plant = Plant(ocp=cart())
     prompt = driver().run(plant, START, 3.0).cost
-    late = {on: driver(delay=2 * DT, compensate=on).run(plant, START, 3.0) for on in (True, False)}
-    # Two intervals pass before anything acts; what they cost no controller can save.
-    idle = closed_loop(Law(law=lambda x, t: [0.0]), plant, START, 2 * DT, dt=DT).cost
-    assert late[True].cost - prompt <= 1.05 * idle
-    assert late[False].cost > 1.05 * late[True].cost
+    late = {
+        on: closed_loop(
+            driver(delay=2 * DT, compensate=on), plant, START, 3.0, dt=DT, head_start=True
+        )
+        for on in (True, False)
+    }
+    # The first input is there in time; the plan it is the first of looks as far as any.
+    assert late[True].cost == pytest.approx(prompt, rel=1e-6)
+    assert late[False].cost > 1.05 * prompt
     assert late[True].decisions[0].applies_at == pytest.approx(2 * DT)
+
+
+def test_without_a_head_start_the_initial_input_acts_and_is_reckoned_with() -> None:
+    """What acts in the meantime is part of the prediction, from the first step on."""
+    seen = []
+    law = Law(law=lambda x, t: [0.0], delay=2 * DT)
+    pushed = closed_loop(law, Plant(ocp=cart()), START, 2 * DT, dt=DT, initial_input=[1.5])
+    mpc = driver(delay=2 * DT)
+    loop = closed_loop(
+        mpc, Plant(ocp=cart()), START, 1.0, dt=DT, initial_input=[1.5],
+        watch=lambda told, decision: seen.append(decision),
+    )  # fmt: skip
+    np.testing.assert_array_equal(loop.inputs[:2], 1.5)
+    np.testing.assert_allclose(seen[0].plan.x[0], pushed.x[-1], atol=1e-6)
+
+
+def test_a_head_start_asks_before_the_plant_moves() -> None:
+    asked = []
+
+    def law(x: np.ndarray, t: float) -> list[float]:
+        asked.append((t, x.copy()))
+        return [0.5]
+
+    loop = closed_loop(
+        Law(law=law, delay=2 * DT), Plant(ocp=cart()), START, 3 * DT, dt=DT, head_start=True
+    )
+    np.testing.assert_allclose([t for t, _ in asked], DT * np.arange(-2, 3), atol=1e-12)
+    for _, x in asked[:3]:
+        np.testing.assert_array_equal(x, START)
+    np.testing.assert_array_equal(loop.inputs, 0.5)
+    assert len(loop.decisions) == 3
+
+    def refuses(x: np.ndarray, t: float) -> list[float]:
+        return [np.nan]
+
+    ended = closed_loop(
+        Law(law=refuses, delay=DT), Plant(ocp=cart()), START, DT, dt=DT, head_start=True
+    )
+    assert len(ended.inputs) == 0
+    assert "the law returned" in ended.ended
 
 
 # -- what is kept ------------------------------------------------------------------------------
