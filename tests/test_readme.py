@@ -1,4 +1,4 @@
-"""The README's example runs as it is printed."""
+"""The README's examples run as they are printed."""
 
 import re
 from pathlib import Path
@@ -8,20 +8,26 @@ import pytest
 README = Path(__file__).parent.parent / "README.md"
 
 
-def example() -> str:
-    (code,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
-    return code
-
-
-def test_readme_example_is_solved(tmp_path, monkeypatch):
+@pytest.fixture
+def names(tmp_path, monkeypatch) -> dict:
+    """What the examples, one after the other, leave behind; their files are in ``tmp_path``."""
     monkeypatch.chdir(tmp_path)
-    names: dict = {}
-    exec(compile(example(), "README.md", "exec"), names)
+    found: dict = {}
+    for code in re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL):
+        exec(compile(code, "README.md", "exec"), found)
+    return found
+
+
+def test_the_readmes_examples_do_what_they_say(names, tmp_path):
     direct, gradient, extremal = (names[n] for n in ("direct", "gradient", "extremal"))
     assert extremal.status.name == "SOLVED"
     costs = [names["evaluate"](s).cost for s in (direct, gradient, extremal)]
     assert costs == pytest.approx([costs[2]] * 3, rel=1e-3)
-    assert (tmp_path / "swing.png").stat().st_size > 10_000
+    rollout = names["rollout"]
+    assert repr(rollout).endswith("violation 0, 80 optimal>")
+    assert rollout.violation == 0.0
+    for picture in ("swing.png", "loop.png"):
+        assert (tmp_path / picture).stat().st_size > 10_000
 
 
 def test_readme_image_is_there():

@@ -34,11 +34,10 @@ def plot_rollout(rollout: Rollout) -> Figure:
     for axes in (states, inputs):
         axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     costs.set_xlabel("time [s]")
-    said = ", ".join(f"{n} {o.name.lower()}" for o, n in rollout.counts.items() if n)
     worst = f"; {rollout.worst}" if rollout.worst else ""
     figure.suptitle(
         f"{rollout.plant.name}: closed-loop cost {rollout.cost:.6g}{worst}\n"
-        f"decisions: {said}{'; ended: ' + rollout.ended if rollout.ended else ''}",
+        f"decisions: {rollout.decided_by}",
         fontsize=10,
     )
     return figure

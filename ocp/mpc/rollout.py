@@ -24,7 +24,7 @@ Progress = Callable[[int, int], object]
 _OUTCOMES = tuple(Outcome)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Rollout:
     """A closed loop of K steps, as the plant saw it.
 
@@ -62,6 +62,19 @@ class Rollout:
     clipped: np.ndarray
     ended: str = ""
     decisions: tuple[Decision, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return one line: what was controlled, what it cost, and who decided."""
+        return (
+            f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
+            f"violation {self.violation:.2g}, {self.decided_by}>"
+        )
+
+    @property
+    def decided_by(self) -> str:
+        """How many decisions came from which rung, and why the loop ended early, in words."""
+        said = ", ".join(f"{n} {o.name.lower()}" for o, n in self.counts.items() if n)
+        return f"{said or 'no decision'}{f'; ended: {self.ended}' if self.ended else ''}"
 
     @property
     def cost(self) -> float:
