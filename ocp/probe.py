@@ -14,14 +14,16 @@ if TYPE_CHECKING:
 _POINTS = 3
 # Another compiler or another order of the same sum changes the last digits.
 _RELATIVE = 1e-9
+_PREFIX = "probe/"
 
 
 def probe(ocp: "OCP") -> dict[str, np.ndarray]:
     """Return the values of a problem's functions at fixed random points, and its bounds.
 
     Values, not expressions: they stay the same where a term is written in another way or another
-    version of CasADi writes it down. Start, parameter values and guess are left out: they belong
-    to a run.
+    version of CasADi writes it down. The points have t in [0, 1] and standard normal x, u and
+    parameters: what happens only elsewhere is not seen. Start, parameter values and guess are
+    left out: they belong to a run.
     """
     m, n_p, functions = ocp.model, ocp.p.numel(), ocp.functions
     rng = np.random.default_rng(0)
@@ -62,8 +64,25 @@ def differing(kept: Mapping[str, np.ndarray], here: Mapping[str, np.ndarray]) ->
         for name in here
         if name not in kept
         or kept[name].shape != here[name].shape
-        or not np.allclose(kept[name], here[name], _RELATIVE, _RELATIVE, equal_nan=True)
+        or not _same(kept[name], here[name])
     )
+
+
+def probe_entries(ocp: "OCP") -> dict[str, np.ndarray]:
+    """Return the probe by the names under which an archive keeps it."""
+    return {f"{_PREFIX}{part}": values for part, values in probe(ocp).items()}
+
+
+def differing_in(data: Mapping[str, np.ndarray], ocp: "OCP") -> tuple[str, ...]:
+    """Return the parts in which a problem differs from an archive's; none where it kept none."""
+    kept = {k.removeprefix(_PREFIX): v for k, v in data.items() if k.startswith(_PREFIX)}
+    return differing(kept, probe(ocp)) if kept else ()
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two parts agree to rounding, which is relative to their largest entry."""
+    size = np.abs(a[np.isfinite(a)]).max(initial=0.0)
+    return np.allclose(a, b, _RELATIVE, _RELATIVE * size, equal_nan=True)
 
 
 def _stacked(box: Box | Constraint) -> np.ndarray:

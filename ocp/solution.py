@@ -16,7 +16,7 @@ from ocp.errors import ProblemError, SolverError
 from ocp.expressions import instance
 from ocp.optimality import derive
 from ocp.pieces import Pieces
-from ocp.probe import differing, probe
+from ocp.probe import differing_in, probe_entries
 from ocp.problem import OCP
 from ocp.status import Status
 
@@ -125,7 +125,9 @@ class Solution:
         if n < 2 or not (np.diff(self.t) > 0.0).all():
             raise ProblemError("solution: t does not increase from node to node")
         for name in ("cost", "residual"):
-            instance(getattr(self, name), (float, int, np.floating), f"solution: {name}")
+            instance(
+                getattr(self, name), (float, int, np.floating, np.integer), f"solution: {name}"
+            )
             if np.isnan(getattr(self, name)):
                 raise ProblemError(f"solution: {name} is NaN")
 
@@ -269,7 +271,7 @@ class Solution:
         content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
         content |= {"status": self.status.name, "problem": self.problem.name}
         content |= {"breaks": self.breaks}
-        content |= {f"probe/{part}": values for part, values in probe(self.problem).items()}
+        content |= probe_entries(self.problem)
         return write_archive(path, content)
 
     @classmethod
@@ -292,8 +294,7 @@ class Solution:
             group, _, key = name.partition("/")
             if key:
                 groups[group][key] = value
-        other = differing(groups["probe"], probe(problem)) if groups["probe"] else ()
-        if other:
+        if other := differing_in(data, problem):
             raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
         if str(data["status"]) not in Status.__members__:
             raise ProblemError(f"{path} is no saved solution: its status is '{data['status']}'")

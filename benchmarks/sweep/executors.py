@@ -89,7 +89,7 @@ def _dask(address: str, patience: float, arrivals: Arrivals) -> Iterator[tuple[E
     """
     try:
         from distributed import Client
-        from distributed.comm import get_address_host_port
+        from distributed.comm.addressing import get_address_host_port
         from distributed.scheduler import KilledWorker
     except ModuleNotFoundError as missing:
         raise SweepError("Dask is not installed: pip install 'ocp-toolkit[dask]'") from missing

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ocp.errors import ProblemError
+from ocp.expressions import whole
 from ocp.mpc.decision import Decision
-from ocp.mpc.plot_rollout import COLOURS, labels
+from ocp.mpc.plot_rollout import COLOURS, labels, refuse_empty
 from ocp.mpc.rollout import Draw, Progress, Rollout
 from ocp.mpc.shift import controls
 from ocp.solution import Solution
@@ -61,9 +62,8 @@ def animate_rollout(
 
 def _times(rollout: Rollout, frames_per_second: int, speed: float) -> np.ndarray:
     """Return the instants that are shown [s]."""
-    if not len(rollout.inputs):
-        raise ProblemError(f"animation: the loop has no step; it ended: {rollout.ended}")
-    if not 1 <= frames_per_second <= _FASTEST:
+    refuse_empty(rollout, "animation")
+    if not 1 <= whole(frames_per_second, "animation: frames per second") <= _FASTEST:
         raise ProblemError(
             f"animation: {frames_per_second} frames per second, a GIF shows 1 to {_FASTEST}"
         )
@@ -175,10 +175,11 @@ class _Film:
         decision = rollout.decisions[k] if rollout.decisions else None
         for panel in self.panels:
             panel.show(t, decision.plan if decision else None)
-        outcome = rollout.outcomes[k]
-        self.figure.suptitle(
-            f"{rollout.plant.name}: t = {t:.2f} s, {outcome.name.lower()}", color=COLOURS[outcome]
-        )
+        outcome = rollout.acting(k)
+        said, colour = "decided before", "0.3"
+        if outcome:
+            said, colour = outcome.name.lower(), COLOURS[outcome]
+        self.figure.suptitle(f"{rollout.plant.name}: t = {t:.2f} s, {said}", color=colour)
         if self.scene and self.draw:
             self.scene.clear()
             self.draw(self.scene, _between(rollout.t, rollout.x, t), t)

@@ -130,8 +130,8 @@ class MPC:
             raise ProblemError(
                 f"MPC of {name}: dt = {dt} s is longer than the horizon of {self.ocp.duration} s"
             )
-        if self.budget is not None and not self.budget > 0.0:
-            raise ProblemError(f"MPC of {name}: budget = {self.budget} s, it must be positive")
+        if self.budget is not None:
+            positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
         if not self.tolerance >= 0.0:
             raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
 
@@ -157,9 +157,10 @@ class MPC:
                 compensated from the first step on; None: nothing is known of it.
         """
         size = self.applied.size(self.ocp)
-        self.acting = None if acting is None else numbers(acting, size, "MPC: acting input")
-        known = () if self.acting is None else (self.acting,) * self.steps_late
-        self.memory = Memory(pending=known)
+        first = None if acting is None else numbers(acting, size, "MPC: acting input")
+        # Without a delay the first decision acts at once.
+        self.acting = first if self.steps_late else None
+        self.memory = Memory(pending=() if first is None else (first,) * self.steps_late)
 
     def step(
         self,
@@ -193,7 +194,7 @@ class MPC:
         if late:
             moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
         new = ladder.new(moment, plan) if plan is not None and not late else None
-        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self.memory.input)
+        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self._last)
         good = plan if late or new is not None else None
         self.memory = self.memory.after(choice and choice.input, good, self.steps_late)
         said = _account(moment, plan, status, late, perf_counter() - started)
@@ -233,6 +234,11 @@ class MPC:
                     f"has {theirs}"
                 )
         return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+
+    @property
+    def _last(self) -> np.ndarray | None:
+        """The last input: decided, or acting until the first decision does."""
+        return self.acting if self.memory.input is None else self.memory.input
 
     def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
         """Collect what a decision is made from."""

@@ -61,13 +61,12 @@ def backup_of(choice: Choice, ocp: OCP, dt: float, applied: Applied) -> Backup:
     """
     if callable(choice):
         return Backup("the user's law", lambda x, t, p: choice(x, t), holds=False)
-    match choice:
-        case None:
-            return Backup("none", None, holds=False)
-        case "hold":
-            return Backup("hold", None, holds=True)
-        case "default":
-            return suggested(ocp, dt, applied)
+    if choice is None:
+        return Backup("none", None, holds=False)
+    if isinstance(choice, str) and choice == "hold":
+        return Backup("hold", None, holds=True)
+    if isinstance(choice, str) and choice == "default":
+        return suggested(ocp, dt, applied)
     raise ProblemError(
         f"{ocp.name}: backup = {choice!r} is neither a law (x, t) -> input nor default, hold, None"
     )

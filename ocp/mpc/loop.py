@@ -35,7 +35,7 @@ def closed_loop(
     """Run a controller on a plant.
 
     The input decided from the measurement at t acts from t + ``controller.delay`` on. Until the
-    first one does, the initial input acts; with a head start none is needed. Where the controller
+    first one does, the initial input acts, unless there is a head start. Where the controller
     refuses, the rollout ends and says why.
 
     Args:
@@ -48,7 +48,8 @@ def closed_loop(
         initial_input: acts during the delay at the start (m,); default: zero, within bounds.
         head_start: the controller is asked from t = -delay on, while the plant is kept at x0, so
             that its first input acts from t = 0 on. It should rest there under the initial input,
-            or a delay that is compensated predicts what does not happen.
+            or a delay that is compensated predicts what does not happen. These decisions are
+            seen by ``watch``; those of the rollout begin at t = 0.
         sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
         watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is.
 
@@ -66,7 +67,8 @@ def closed_loop(
     if initial_input is not None:
         first = numbers(initial_input, m, "closed loop: initial_input")
     controller.reset(first)
-    journal, late = _Journal(plant.ocp, plant.started(x0, seed)), late_steps(controller.delay, dt)
+    late = late_steps(controller.delay, dt)
+    journal = _Journal(plant.ocp, plant.started(x0, seed), late)
     ahead = [] if head_start else [first] * late
     for k in range(-late if head_start else 0, steps):
         measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
@@ -111,6 +113,7 @@ class _Journal:
 
     ocp: OCP
     running: RunningPlant
+    late: int
     t: list[float] = field(default_factory=list)
     x: list[np.ndarray] = field(default_factory=list)
     measured: list[np.ndarray] = field(default_factory=list)
@@ -157,6 +160,7 @@ class _Journal:
             clipped=np.array([d.clipped for d in self.decisions]),
             ended=self.ended,
             decisions=tuple(self.decisions),
+            late=self.late,
         )
 
 

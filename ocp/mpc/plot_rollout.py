@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ocp.errors import ProblemError
 from ocp.mpc.decision import Outcome
 from ocp.mpc.rollout import Rollout
 
@@ -17,7 +18,12 @@ COLOURS = {
 
 
 def plot_rollout(rollout: Rollout) -> Figure:
-    """Return states, inputs and running cost over time; the shade says where an input is from."""
+    """Return states, inputs and running cost over time; the shade says where an input is from.
+
+    Raises:
+        ProblemError: if the loop has no step.
+    """
+    refuse_empty(rollout, "plot")
     figure = Figure(figsize=(9.0, 8.0), layout="constrained")
     states, inputs, costs = figure.subplots(3, 1, sharex=True)
     model = rollout.plant.model
@@ -43,6 +49,12 @@ def plot_rollout(rollout: Rollout) -> Figure:
     return figure
 
 
+def refuse_empty(rollout: Rollout, what: str) -> None:
+    """Raise ``ProblemError`` if the loop ended before its first step."""
+    if not len(rollout.inputs):
+        raise ProblemError(f"{what}: the loop has no step; it ended: {rollout.ended}")
+
+
 def labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names with their units, where there are any."""
     return tuple(f"{n} [{u}]" for n, u in zip(names, units, strict=True)) if units else names
@@ -50,7 +62,8 @@ def labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
 
 def _shade(axes: Axes, rollout: Rollout) -> None:
     """Colour the background where the input is not that of an optimal plan."""
-    for k, outcome in enumerate(rollout.outcomes):
-        if outcome is not Outcome.OPTIMAL:
+    for k in range(len(rollout.inputs)):
+        outcome = rollout.acting(k)
+        if outcome not in (None, Outcome.OPTIMAL):
             left, right = rollout.t[k], rollout.t[k + 1]
             axes.axvspan(left, right, color=COLOURS[outcome], alpha=0.25, lw=0)

@@ -33,7 +33,7 @@ class FlightRecorder:
         self._mpc, self.path = mpc, Path(path)
         self._last: Solution | None = None
         self._file: BinaryIO = self.path.open("wb")
-        self._begun = False
+        self._begun, self._t = False, -np.inf
 
     def __enter__(self) -> Self:
         """Return the recorder."""
@@ -49,12 +49,19 @@ class FlightRecorder:
         self._file.close()
 
     def watch(self, measured: np.ndarray, decided: Decision | ControlRefused) -> None:
-        """Write down a step of the controller that has just decided, or refused."""
+        """Write down a step of the controller that has just decided, or refused.
+
+        Raises:
+            ProblemError: if it is a step of another run, or of a controller that is no ``MPC``.
+        """
         step = decided.attempt if isinstance(decided, ControlRefused) else decided
         if step is None:
             raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
         if not self._begun:
             self._begin()
+        if step.t < self._t:
+            raise ProblemError(f"{self.path}: t goes back to {step.t:g} s; a record is of one run")
+        self._t = step.t
         plan = self._mpc.memory.plan
         self._file.write(packed(measured, step, plan if plan is not self._last else None))
         self._file.flush()

@@ -10,7 +10,9 @@ import numpy as np
 
 from ocp.archive import read_archive, write_archive
 from ocp.errors import ProblemError, SolverError
+from ocp.expressions import instance
 from ocp.mpc.decision import Decision, Outcome
+from ocp.probe import differing_in, probe_entries
 from ocp.problem import OCP
 
 if TYPE_CHECKING:
@@ -45,6 +47,8 @@ class Rollout:
         clipped: by how much each input was clipped (K,).
         ended: why the loop ended early; empty if it did not.
         decisions: all of them, with their plans; empty where the rollout was loaded.
+        late: intervals from a decision to its effect. The inputs of the first so many were
+            decided before the rollout begins, or are the initial one.
     """
 
     plant: OCP
@@ -62,6 +66,7 @@ class Rollout:
     clipped: np.ndarray
     ended: str = ""
     decisions: tuple[Decision, ...] = ()
+    late: int = 0
 
     def __repr__(self) -> str:
         """Return one line: what was controlled, what it cost, and who decided."""
@@ -75,6 +80,10 @@ class Rollout:
         """How many decisions came from which rung, and why the loop ended early, in words."""
         said = ", ".join(f"{n} {o.name.lower()}" for o, n in self.counts.items() if n)
         return f"{said or 'no decision'}{f'; ended: {self.ended}' if self.ended else ''}"
+
+    def acting(self, k: int) -> Outcome | None:
+        """The rung whose input acts in interval k; None where it was decided before t0."""
+        return self.outcomes[k - self.late] if k >= self.late else None
 
     @property
     def cost(self) -> float:
@@ -145,6 +154,7 @@ class Rollout:
             "messages": np.array(self.messages, dtype=str),
             "plant": self.plant.name,
         }
+        content |= probe_entries(self.plant)
         return write_archive(path, content)
 
     @classmethod
@@ -152,12 +162,16 @@ class Rollout:
         """Read a rollout of ``plant`` from a file that ``save`` wrote.
 
         Raises:
-            ProblemError: if the file belongs to another plant or is no rollout.
+            ProblemError: if the file belongs to another plant, by its name or by what its
+                functions and bounds are, or is no rollout.
         """
+        instance(plant, OCP, f"the plant that {path} is to be a loop with")
         needed = {"outcomes", "messages", "plant", *_ARRAYS, *_SCALARS}
         data = read_archive(path, "rollout", needed)
         if str(data["plant"]) != plant.name:
             raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
+        if other := differing_in(data, plant):
+            raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
         if not np.isin(data["outcomes"], range(len(_OUTCOMES))).all():
             raise ProblemError(f"{path} is no saved rollout: an outcome is none of the four")
         return cls(
@@ -170,4 +184,4 @@ class Rollout:
 
 
 _ARRAYS = ("t", "x", "measured", "inputs", "costs", "step_times", "clipped")
-_SCALARS = {"violation": float, "worst": str, "drift": float, "ended": str}
+_SCALARS = {"violation": float, "worst": str, "drift": float, "ended": str, "late": int}

@@ -210,6 +210,7 @@ def test_a_head_start_asks_before_the_plant_moves() -> None:
         np.testing.assert_array_equal(x, START)
     np.testing.assert_array_equal(loop.inputs, 0.5)
     assert len(loop.decisions) == 3
+    assert [loop.acting(k) for k in range(3)] == [None, None, Outcome.FEASIBLE]
 
     def refuses(x: np.ndarray, t: float) -> list[float]:
         return [np.nan]
@@ -219,6 +220,8 @@ def test_a_head_start_asks_before_the_plant_moves() -> None:
     )
     assert len(ended.inputs) == 0
     assert "the law returned" in ended.ended
+    with pytest.raises(ProblemError, match=r"plot: the loop has no step; it ended: .*the law"):
+        ended.plot()
 
 
 # -- what is kept ------------------------------------------------------------------------------
@@ -236,6 +239,36 @@ def test_a_rollout_is_saved_and_read(tmp_path: Path) -> None:
     (tmp_path / "no.npz").write_bytes(b"nothing")
     with pytest.raises(ProblemError, match="no saved rollout"):
         Rollout.load(tmp_path / "no.npz", cart())
+
+
+def test_a_rollout_of_another_plant_of_the_same_name_is_refused(tmp_path: Path) -> None:
+    loop = driver().run(Plant(ocp=cart()), START, 0.5)
+    with pytest.raises(ProblemError, match="is a loop with another 'cart': dynamics"):
+        Rollout.load(loop.save(tmp_path / "loop"), cart(mass=2.0))
+    with pytest.raises(ProblemError, match="the plant that"):
+        Rollout.load(tmp_path / "loop.npz", "cart")  # pyright: ignore[reportArgumentType]
+
+
+def test_what_acts_during_the_delay_can_be_held() -> None:
+    mpc = driver(delay=2 * DT, backup="hold")
+    blind = closed_loop(
+        mpc, Plant(ocp=cart()), START, 3 * DT, dt=DT, initial_input=[0.7],
+        sensors=lambda x, t: np.full_like(x, np.nan),
+    )  # fmt: skip
+    np.testing.assert_array_equal(blind.or_raise().inputs, 0.7)
+    prompt = closed_loop(
+        driver(backup="hold"), Plant(ocp=cart()), START, DT, dt=DT,
+        sensors=lambda x, t: np.full_like(x, np.nan),
+    )  # fmt: skip
+    assert "no input to hold" in prompt.ended
+
+
+def test_a_flight_record_is_of_one_run(tmp_path: Path) -> None:
+    mpc = driver()
+    with FlightRecorder(mpc, tmp_path / "flight") as recorder:
+        mpc.run(Plant(ocp=cart()), START, 0.3, watch=recorder.watch)
+        with pytest.raises(ProblemError, match="t goes back to 0 s; a record is of one run"):
+            mpc.run(Plant(ocp=cart()), START, 0.3, watch=recorder.watch)
 
 
 def unconstrained_named():
