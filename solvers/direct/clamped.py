@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ocp import Box
+from solvers.direct.riccati_sweep import units
 
-# Violations and slopes below this, relative to what they are made of, are rounding.
+# Violations and slopes below this, relative to what is given for each, are rounding.
 _ROUNDING = 1e-12
 # Most exchanges: a good guess takes one or two, and without end none is worth while.
 _LIMIT = 15
@@ -30,22 +31,26 @@ class Clamped:
     Attributes:
         below: from the controls to their lower bounds, (nu, N).
         above: to their upper ones.
+        unit: of the controls, (nu, 1).
         side: -1: at the lower bound, 1: at the upper one, 0: free, (nu, N).
     """
 
     below: np.ndarray
     above: np.ndarray
+    unit: np.ndarray
     side: np.ndarray
     _wrong: np.ndarray = field(init=False)
-    _off: np.ndarray = field(init=False)
+    _out: np.ndarray = field(init=False)
     _fewest: float = field(default=np.inf, init=False)
     _left: int = field(default=_LIMIT, init=False)
 
     @classmethod
     def at(cls, u: np.ndarray, pull: np.ndarray, bounds: Box) -> "Clamped":
         """Begin with those that a step against the slopes ``pull`` of the cost takes out."""
+        unit = units(bounds)[:, None]
         below, above = np.asarray(bounds.lower)[:, None] - u, np.asarray(bounds.upper)[:, None] - u
-        return cls(below, above, (above < -pull).astype(float) - (-pull < below))
+        step = -(unit**2) * pull
+        return cls(below, above, unit, (above < step).astype(float) - (step < below))
 
     @property
     def chosen(self) -> np.ndarray:
@@ -60,16 +65,22 @@ class Clamped:
     def suits(self, du: np.ndarray, slope: np.ndarray, scale: float) -> bool:
         """Return whether the choice is right, by the step and the slopes g that it has led to.
 
-        Both conditions at once: du = clip(du - g), since g = 0 where a control is free and du is
-        at a bound where it is clamped.
+        Steps and slopes have different units, so each has a measure of its own: a free control
+        may leave its bounds by a rounding error of their width, or of 1 + abs(du) where they are
+        not both finite. A clamped one may have the wrong sign of e g, with its unit e (see
+        ``units``), by one of the scale; it stays where its bounds are equal.
 
         Args:
             du: the step (nu, N).
             slope: g (nu, N).
-            scale: of what steps and slopes are made of.
+            scale: of what the slopes are made of.
         """
-        self._off = du - np.minimum(np.maximum(du - slope, self.below), self.above)
-        self._wrong = np.abs(self._off) > _ROUNDING * scale
+        width, free = self.above - self.below, self.side == 0.0
+        reach = np.where(np.isfinite(width), width, 1.0 + np.abs(du))
+        self._out = du - np.clip(du, self.below, self.above)
+        leaves = np.abs(self._out) > _ROUNDING * reach
+        pulled = (self.side * slope * self.unit > _ROUNDING * scale) & (width > 0.0)
+        self._wrong = np.where(free, leaves, pulled)
         return not self._wrong.any()
 
     def exchange(self) -> bool:
@@ -82,6 +93,6 @@ class Clamped:
             stages, components = np.nonzero(wrong.T)
             wrong = np.zeros_like(wrong)
             wrong[components[-1], stages[-1]] = True
-        other = np.where(self.side == 0.0, np.sign(self._off), 0.0)
+        other = np.where(self.side == 0.0, np.sign(self._out), 0.0)
         self.side = np.where(wrong, other, self.side)
         return self._left >= 0

@@ -2,8 +2,8 @@
 
 import casadi as ca
 
-from ocp import OCP, Integrator, Stage, compiled, curvature
-from solvers.direct.riccati_sweep import backwards, clipped, follow, forwards
+from ocp import OCP, Box, Integrator, Stage, compiled, curvature
+from solvers.direct.riccati_sweep import backwards, clipped, follow, forwards, units
 
 
 def _symbols(ocp: OCP, n: int) -> dict[str, ca.MX]:
@@ -44,14 +44,16 @@ def look(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> ca.Function
     end_cost, end_slope, end_hessian = _end(ocp)(x[:, -1], s["t"][-1] + s["h"][-1], s["p_final"])
     end_slope = end_slope - costate[:, -1]
     pull = slope[ocp.model.nx :, backwards_in_time]
-    room = u - _clip(ocp, n)(u - pull) if ocp.control_bounds.is_active else pull
+    largest = ca.norm_inf(ca.vec(costate))
+    bounds = ocp.control_bounds
+    room = _room(u, pull, 1 + largest, bounds) if bounds.is_active else pull
     numbers = [
         ca.sum2(cost) + end_cost,
         ca.norm_1(ca.vec(gap)),
         # Norms of squares: the largest number of CasADi does not see NaN.
         ca.norm_2(ca.vec(gap)),
         ca.norm_2(ca.vertcat(ca.vec(slope[: ocp.model.nx, :]), ca.vec(room), end_slope)),
-        ca.norm_inf(ca.vec(costate)),
+        largest,
         ca.norm_inf(ca.vec(hessian[ocp.model.nx :, :])),
     ]
     names = ("x", "u", "costate", "t", "h", "p0", "p1", "p_final")
@@ -113,10 +115,21 @@ def move(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> ca.Function
     return ca.Function("go", [s[name] for name in names], results)
 
 
-def _clip(ocp: OCP, n: int) -> ca.Function:
-    """Return the nearest controls within their bounds, of all stages."""
-    u = ca.SX.sym("u", ocp.model.nu)
-    return ca.Function("clip", [u], [clipped(u, ocp.control_bounds)]).map(n)
+def _room(u: ca.MX, slope: ca.MX, size: ca.MX, bounds: Box) -> ca.MX:
+    r"""Return the slopes in the controls (nu, N) as far as the bounds leave room.
+
+    With the units e of ``units``, and the size s = 1 + abs(p) that slopes are relative to,
+
+    .. math:: s \; (u - \mathrm{clip}(u - e^2 g / s)) / e
+
+    which is e g away from the bounds. The step has to be made relative before it is clipped: no
+    step is longer than the bounds are wide, and then relative to a large s that is nothing.
+    """
+    one, step = (ca.SX.sym(name, u.shape[0]) for name in ("u", "step"))
+    unit = units(bounds)
+    room = (one - clipped(one - unit * step, bounds)) / unit
+    nearest = ca.Function("room", [one, step], [room]).map(u.shape[1])
+    return size * nearest(u, ca.diag(unit) @ slope / size)
 
 
 def _end(ocp: OCP) -> ca.Function:

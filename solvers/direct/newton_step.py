@@ -36,7 +36,8 @@ class View:
         gaps: sum of abs(c).
         gap: norm of c.
         slope: norm of the Lagrangian's slopes in states and controls, these as far as the bounds
-            leave room: u - clip(u - slope).
+            leave room: s (u - clip(u - slope / s)) with s = 1 + abs(p), where the bounds are
+            wider than one; else their width is the unit of u.
         largest_costate: largest abs(p).
         size: largest element of H_uu and H_ux, to measure a shift by.
     """

@@ -129,3 +129,13 @@ def clipped(u: ca.SX, bounds: Box) -> ca.SX:
     ]
     rows = [ca.fmin(v, b) if np.isfinite(b) else v for v, b in zip(rows, upper, strict=True)]
     return ca.vertcat(*rows)
+
+
+def units(bounds: Box) -> np.ndarray:
+    """Return in what each control is measured: the width of its bounds, at most and else one.
+
+    A slope times its unit is what a control can make of it. Wide bounds often stand for none, so
+    that their width says nothing; bounds that are equal have none.
+    """
+    width = np.asarray(bounds.upper) - np.asarray(bounds.lower)
+    return np.where(width > 0.0, np.minimum(width, 1.0), 1.0)

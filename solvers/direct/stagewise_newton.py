@@ -55,7 +55,8 @@ class StagewiseNewton(Solver):
             brings its own number.
         integrator: one-step method in each interval.
         tolerance: of the residual: norm of all gaps, or of the slopes of the Lagrangian
-            relative to 1 + the largest costate.
+            relative to 1 + the largest costate; slopes in controls per width of their bounds,
+            where that is less than one.
         max_iterations: most Newton steps.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
             interval is halved; an answer beyond it is ``INACCURATE``.

@@ -158,12 +158,16 @@ def test_a_linear_quadratic_problem_takes_one_step(limit: float) -> None:
 
 
 def test_the_end_is_quadratic() -> None:
-    """Once the right controls are clamped: each residual is the last one's square, times 100."""
+    """Once the right controls are clamped: each residual is the last one's square, times 100.
+
+    That is for slopes per unit of the control; the residual has them per width of the bounds, 0.4.
+    """
     solution = solve(bounded_quartic(), StagewiseNewton(40, tolerance=1e-13))
     assert at_bounds(solution) > 0.1
     tail = solution.history["residual"][-3:]
     assert tail[0] < 1e-4
-    assert (tail[1:] < 100.0 * tail[:-1] ** 2).all(), tail
+    per_unit = tail / 0.4
+    assert (per_unit[1:] < 100.0 * per_unit[:-1] ** 2).all(), tail
 
 
 def test_from_its_own_answer_nothing_is_left_to_do() -> None:
@@ -249,6 +253,69 @@ def test_exchanges_end_at_the_minimum(seed: int, size: int) -> None:
             break
         assert clamped.exchange()
     np.testing.assert_allclose(u + du, bounds.clip(u + du - slope), atol=1e-8)
+
+
+# -- units -------------------------------------------------------------------------------
+
+
+def stiff_spring(per_control: float, per_cost: float) -> OCP:
+    """A spring that bends, pushed by at most 1 and 0.5, in any units of push and cost."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    push = per_control * u
+    return OCP(
+        name="in other units",
+        model=Model(name="spring", x=x, u=u, f=ca.vertcat(x[1], push - 0.3 * ca.sin(x[0]))),
+        x0=[1.0, 0.0],
+        horizon=3.0,
+        running_cost=per_cost * (ca.sumsqr(x) + 0.1 * push**2),
+        control_bounds=Box(-1.0 / per_control, 0.5 / per_control),
+    )
+
+
+@pytest.mark.parametrize(
+    ("per_control", "per_cost"), [(1e3, 1e3), (1e5, 1.0), (1e5, 1e5), (1e6, 1e6), (1e9, 1e9)]
+)
+def test_units_change_neither_status_nor_cost_nor_steps(
+    per_control: float, per_cost: float
+) -> None:
+    plain, other = (
+        solve(stiff_spring(*units), StagewiseNewton(40))
+        for units in ((1.0, 1.0), (per_control, per_cost))
+    )
+    assert plain.status is other.status is Status.SOLVED, other.message
+    assert other.iterations == plain.iterations
+    assert other.cost == pytest.approx(per_cost * plain.cost, rel=1e-12)
+    np.testing.assert_allclose(per_control * other.u, plain.u, atol=1e-9)
+
+
+def low_thrust(duration: float, thrust: float) -> OCP:
+    """Come to rest from where half the duration of full thrust would lead; thrust is free."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    return OCP(
+        name="low thrust",
+        model=Model(name="double integrator", x=x, u=u, f=ca.vertcat(x[1], u)),
+        x0=[thrust * duration**2 / 8.0, 0.0],
+        horizon=duration,
+        running_cost=x[0] ** 2 / duration,
+        control_bounds=Box(-thrust, thrust),
+    )
+
+
+@pytest.mark.parametrize("duration", [1e3, 1e4])
+def test_weak_controls_end_where_strong_ones_do(duration: float) -> None:
+    """Bounds of 1e-4 m/s^2: no step is longer, which relative to the costates is nothing."""
+    weak = within(solve(low_thrust(duration, 1e-4), StagewiseNewton(40)))
+    plain = solve(low_thrust(1.0, 1.0), MultipleShooting(40, tolerance=1e-10))
+    assert weak.status is Status.SOLVED, weak.message
+    assert weak.cost / (1e-4 * duration**2) ** 2 == pytest.approx(plain.cost, rel=1e-6)
+
+
+@pytest.mark.parametrize("duration", [1e4, 1e6])
+def test_weak_controls_do_not_pass_for_optimal_ones(duration: float) -> None:
+    """Far from the minimum they say so, however large the costates."""
+    few = solve(low_thrust(duration, 1e-4), StagewiseNewton(40, max_iterations=1))
+    assert few.status is Status.ITERATION_LIMIT
+    assert few.residual > 1e-3
 
 
 # -- shapes ------------------------------------------------------------------------------
