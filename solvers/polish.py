@@ -11,6 +11,8 @@ SEGMENTS, STEPS = 15, 300
 _MOST_STEPS = 2**16
 # Newton that fails from a held control of N intervals starts again from one of this many times N.
 _FINER = 4
+# But not of more: an extremal given again has steps by the thousand, which are no intervals.
+_MOST_INTERVALS = 600
 # The cost is flat about an optimum: where it holds to some accuracy, states may move by more.
 _STATE = 100.0
 
@@ -21,10 +23,10 @@ def polish(
     """Polish a solution to an extremal, and say whether it is a minimum.
 
     States and costates of the solution start indirect multiple shooting; where Newton fails
-    from them, it starts once more from a direct solution on a grid four times as fine. The
-    steps are doubled until the answer holds still. The extremal is ``SOLVED`` if the
-    second-order test passes (no conjugate point), and stays ``STATIONARY``, with the reason as
-    its message, if not.
+    from them, it starts once more from a direct solution on a grid four times as fine, of 600
+    intervals at most. The steps are doubled until the answer holds still. The extremal is
+    ``SOLVED`` if the second-order test passes (no conjugate point), and stays ``STATIONARY``,
+    with the reason as its message, if not.
 
     Args:
         solution: of any method that returns costates, near an extremal.
@@ -92,8 +94,8 @@ def _newton(program: IndirectShootingProgram, guess: Solution) -> Solution:
 
 
 def _on_finer_grid(solution: Solution) -> Solution:
-    """Return the direct solution on a finer grid, or the same one if there is none."""
-    intervals = _FINER * (len(solution.t) - 1)
+    """Return the direct solution on another grid, finer if it may be, or the same one."""
+    intervals = min(_FINER * (len(solution.t) - 1), _MOST_INTERVALS)
     data, program = solution.data, MultipleShooting(intervals).build(solution.problem)
     finer_grid = program.run(x0=data.x0, t0=data.t0, parameters=solution.parameters, guess=solution)
     return finer_grid if finer_grid.status.is_success else solution

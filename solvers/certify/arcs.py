@@ -28,6 +28,7 @@ class Law:
         name: what is active, for people and for comparison.
         value: the control, in the states, the time and the parameters of the problem.
         push: times H_u it is not positive at an optimum: the multiplier has the right sign.
+            Zero for an equation, whose multiplier may have any.
         row: which row of the path constraints it keeps at its bound; None: a bound of the control.
     """
 
@@ -67,7 +68,7 @@ def arcs_of(answer: Solution) -> tuple[Arc, ...]:
 
     A piece counts to an arc if the law of the arc holds on all of it. Pieces between two arcs
     that follow neither, such as those in which a switch lies, are shared between the two if
-    they are short.
+    they are short. There are none where every piece is too short: the control chatters.
 
     Args:
         answer: of collocation.
@@ -80,18 +81,20 @@ def arcs_of(answer: Solution) -> tuple[Arc, ...]:
         for k, (left, right) in enumerate(pairwise(edges))
     ]
     long = [arc for arc in _joined(pieces) if arc.end - arc.start > arc.shortest]
-    return tuple(_joined(list(_meeting(_joined(long)))))
+    return tuple(_joined(list(_meeting(_joined(long))))) if long else ()
 
 
 def _laws(ocp: OCP, j: int) -> list[tuple[Law, ca.SX]]:
-    """What can decide a control, and by how much each is missed."""
-    u, found = ca.vertsplit(ocp.model.u)[j], []
+    """What can decide a control, and by how much each is missed.
+
+    An equation decides it everywhere: where one does, nothing else is asked.
+    """
+    u, found, equations = ca.vertsplit(ocp.model.u)[j], [], []
     box = ocp.control_bounds
-    for side, sign, values in (("lower", -1.0, box.lower), ("upper", 1.0, box.upper)):
-        bound = float(np.asarray(values)[j])
-        if np.isfinite(bound):
-            law = Law(f"{side} bound of {u}", ca.SX(bound), ca.SX(sign))
-            found.append((law, _missed(u, bound)))
+    low, high = (float(np.asarray(values)[j]) for values in (box.lower, box.upper))
+    for side, sign, bound in _sides(low, high):
+        law = Law(f"{side} bound of {u}", ca.SX(bound), ca.SX(sign))
+        (found if sign else equations).append((law, _missed(u, bound)))
     rows = [
         (c.name, e, float(low), float(high))
         for c in ocp.at("path")
@@ -104,12 +107,18 @@ def _laws(ocp: OCP, j: int) -> list[tuple[Law, ca.SX]]:
         if slope.nnz() != 1 or slope.sparsity().get_col() != [j] or ca.depends_on(slope, u):
             continue
         rest = ca.substitute(e, u, 0.0)
-        for side, sign, bound in (("lower", -1.0, low), ("upper", 1.0, high)):
-            if np.isfinite(bound):
-                push = sign * slope[0, j]
-                law = Law(f"{name} {side}", (bound - rest) / slope[0, j], push, i)
-                found.append((law, _missed(e, bound)))
-    return found
+        for side, sign, bound in _sides(low, high):
+            law = Law(f"{name} {side}", (bound - rest) / slope[0, j], sign * slope[0, j], i)
+            (found if sign else equations).append((law, _missed(e, bound)))
+    return equations or found
+
+
+def _sides(low: float, high: float) -> list[tuple[str, float, float]]:
+    """Finite bounds with their names and signs; of an equation one, whose multiplier has any."""
+    if low == high:
+        return [("equation", 0.0, low)]
+    sides = ("lower", -1.0, low), ("upper", 1.0, high)
+    return [side for side in sides if np.isfinite(side[2])]
 
 
 def _missed(expression: ca.SX, bound: float) -> ca.SX:

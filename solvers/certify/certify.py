@@ -59,7 +59,8 @@ class Effort:
         seed: of these.
         enumerate: whether extremals are enumerated where that is possible.
         seconds: after so many no further method and no further check is begun; what has begun
-            is finished. What was left out counts as not checked.
+            is finished, and methods are tried until one has answered. What was left out counts
+            as not checked.
     """
 
     intervals: int = 40
@@ -119,7 +120,8 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         the certificate; it says itself whether it holds, and what was not checked.
 
     Raises:
-        UnsupportedProblem: if direct multiple shooting solves the problem on no grid.
+        UnsupportedProblem: if direct multiple shooting solves the problem on no grid, or no
+            method answers.
     """
     effort = effort or Effort()
     instance(solution, Solution, "certify: solution")
@@ -131,7 +133,7 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
     estimates, silent = _estimates(solution, coarse, clock)
     if not estimates:
-        why = " ".join(check.sentence for check in silent)
+        why = "; ".join(f"{check.name}: {check.sentence}" for check in silent)
         raise UnsupportedProblem(f"{solution.problem.name}: no method certifies it. {why}")
     best = estimates[0]
     smooth = best.is_extremal
@@ -155,7 +157,7 @@ def _estimates(
     """What the methods say, an extremal first, then the most accurate; and why others do not.
 
     Arcs are looked at, and doubled grids of direct shooting asked, only where another method
-    is missing: the latter are the least accurate.
+    is missing: the latter are the least accurate. Time ends the search once one has answered.
     """
     found: list[Estimate] = []
     silent: list[Check] = []
@@ -173,7 +175,7 @@ def _estimates(
     for name, method in methods.items():
         if len(found) == _METHODS:
             break
-        if clock.is_late:
+        if found and clock.is_late:
             silent.append(clock.left_out(name))
             continue
         try:

@@ -75,9 +75,9 @@ class Stretched:
         time = ocp.time_box if isinstance(duration, FreeTime) else Box([duration], [duration])
         data, box = self.start.data, ocp.state_bounds
         begin = np.append(data.x0, data.t0)
-        own = () if ocp.has_free_start else (_fixed("start", m.x, data.x0),)
+        own = () if ocp.has_free_start else (self._fixed("start", m.x, data.x0),)
         states = ca.vertcat(m.x, m.t, self._durations)
-        arc = Signal("arc", self._now, np.vstack([np.eye(count), np.eye(count)[-1]]))
+        arc = Signal(self._name("arc"), self._now, np.vstack([np.eye(count), np.eye(count)[-1]]))
         return OCP(
             name=f"{ocp.name}, on {count} arcs",
             model=Model(
@@ -97,11 +97,11 @@ class Stretched:
             ),
             constraints=(
                 *own,
-                _fixed("begin", m.t, data.t0),
+                self._fixed("begin", m.t, data.t0),
                 *self._path(),
                 *(c for c in ocp.constraints if c.at != "path"),
                 Constraint(
-                    "horizon",
+                    self._name("horizon"),
                     m.t,
                     data.t0 + np.asarray(time.lower),
                     data.t0 + np.asarray(time.upper),
@@ -111,6 +111,17 @@ class Stretched:
             parameters=(*ocp.parameters, arc),
             smoothness=ocp.smoothness,
         )
+
+    def _fixed(self, name: str, expression: ca.SX, value: np.ndarray | float) -> Constraint:
+        return Constraint(self._name(name), expression, value, value, at="initial")
+
+    def _name(self, name: str) -> str:
+        """Return a name that the problem does not use itself."""
+        ocp = self.start.problem
+        taken = {entry.name for entry in (*ocp.constraints, *ocp.parameters)}
+        while name in taken:
+            name = f"{name} of the arcs"
+        return name
 
     @property
     def _pinned(self) -> ca.SX:
@@ -133,19 +144,28 @@ class Stretched:
             ):
                 kept = [any(law and law.row == row for law in arc.laws) for arc in self.arcs]
                 share = ca.dot(self._now, ca.DM(np.array(kept, dtype=float)))
-                parts.append((1.0 - share) * e + share * _between(float(low), float(high)))
+                part = (1.0 - share) * e + share * _between(float(low), float(high))
+                parts += [] if all(kept) else [(part, low, high)]
                 row += 1
-            found.append(Constraint(c.name, ca.vertcat(*parts), c.lower, c.upper))
+            if parts:
+                rows, lower, upper = zip(*parts, strict=True)
+                found.append(Constraint(c.name, ca.vertcat(*rows), lower, upper))
         return found
 
     def trajectory(self, answer: Solution) -> Solution:
-        """Return an answer to the stretched problem, controls held, as one to the original."""
+        """Return an answer to the stretched problem, controls held, as one to the original.
+
+        Time and start are among its states, which a solver meets to rounding: here they are exact.
+        """
         ocp, count = self.start.problem, len(self.arcs)
         m, each = ocp.model, (len(answer.t) - 1) // count
         controls = ca.Function("u", [m.x, m.t, m.u, ocp.p, self._now], [self._control])
         arc = np.repeat(np.eye(count), each, axis=0)
         p = np.tile(self.start.data.values.at(0.0), (len(arc), 1))
-        x, t = answer.x[:, : m.nx], answer.x[:, m.nx]
+        x, t = answer.x[:, : m.nx].copy(), answer.x[:, m.nx].copy()
+        t[0] = self.start.data.t0
+        if not ocp.has_free_start:
+            x[0] = self.start.data.x0
         ends = [
             np.array(
                 controls.map(len(arc))(*[v.T for v in (x[k], t[k][:, None], answer.u, p, arc)])
@@ -173,10 +193,6 @@ class Stretched:
         times = np.interp(s, np.arange(len(edges)), edges) + self.start.t[0]
         x = np.hstack([self.start.state(times), times[:, None], np.tile(self.lengths, (len(s), 1))])
         return Guess(x=x, u=self.start.control(times))
-
-
-def _fixed(name: str, expression: ca.SX, value: np.ndarray | float) -> Constraint:
-    return Constraint(f"{name} of the arcs", expression, value, value, at="initial")
 
 
 def _between(low: float, high: float) -> float:

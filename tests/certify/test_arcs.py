@@ -1,5 +1,7 @@
 """Arcs: seen in a trajectory, shot over, and compared with closed forms."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from models import (
     mixed_constraint,
     turnpike,
 )
-from ocp import OCP, Constraint, Signal, Solution, solve
+from ocp import OCP, Box, Constraint, Model, Parameter, Signal, Solution, evaluate, solve
 from solvers import Collocation, Verdict
 from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
@@ -20,6 +22,7 @@ from solvers.certify.arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.estimates import NoEstimateError
+from solvers.certify.global_evidence import other_data
 from solvers.certify.stretched import Stretched
 from tests.tolerances import DERIVATIVE, STEP
 
@@ -69,6 +72,7 @@ def test_closed_forms(build, optimum, kind):
     assert estimate.method.startswith(kind)
     assert abs(estimate.cost - optimum) <= max(estimate.error, 1e-10)
     assert estimate.violation <= 1e-8
+    assert other_data(estimate.solution) == ""
     limit = 1e-9 if kind == "indirect" else 1e-6
     assert hamiltonian_check(estimate.solution, limit).verdict is Verdict.HOLDS
 
@@ -112,6 +116,68 @@ def test_what_is_not_said_is_said():
     answer, arcs = fewest(turnpike())
     with pytest.raises(NoArcsError, match="not quadratic in u"):
         ArcConditions(answer, arcs)
+
+
+def two_pushes(bounds: Box, *path: Constraint, x: ca.SX, u: ca.SX) -> OCP:
+    """x'' = u_0 + u_1 to rest, where something else decides u_1."""
+    return OCP(
+        name="two pushes",
+        model=Model(name="two pushes", x=x, u=u, f=ca.vertcat(x[1], u[0] + u[1])),
+        x0=[1.0, 0.0],
+        horizon=3.0,
+        running_cost=ca.sumsqr(x) + 0.1 * u[0] ** 2,
+        control_bounds=bounds,
+        constraints=(*path, Constraint("rest", x, 0.0, 0.0, at="terminal")),
+    )
+
+
+@pytest.mark.parametrize("kind", ["box", "path"])
+def test_an_equation_is_one_law_whose_multiplier_may_have_any_sign(kind):
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)
+    if kind == "box":
+        ocp = two_pushes(Box([-0.9, -0.1], [0.9, -0.1]), x=x, u=u)
+    else:
+        follow = Constraint("follow", u[1] - 0.1 * x[0], 0.0, 0.0)
+        ocp = two_pushes(Box([-0.9, -9.0], [0.9, 9.0]), follow, x=x, u=u)
+    answer, arcs = fewest(ocp)
+    assert {arc.names[1] for arc in arcs} == {
+        "equation bound of u_1" if kind == "box" else "follow equation"
+    }
+    assert {arc.names[0] for arc in arcs} >= {"lower bound of u_0", "free"}
+    assert not [c for c in Stretched(answer, arcs).ocp.at("path") if c.name == "follow"]
+    estimate = by_arcs(answer)
+    assert estimate.method.startswith("indirect")
+    assert estimate.cost == pytest.approx(evaluate(answer).cost, abs=1e-4)
+
+
+def test_chattering_shows_no_arcs():
+    """The control jumps from bound to bound on pieces too short for an arc."""
+    ocp, count = double_integrator_minimum_time(), 600
+    t = np.linspace(0.0, 2.0, count + 1)
+    u = np.repeat(np.where(np.arange(count) % 2, 1.0, -1.0), 2)[:, None]
+    answer = collocated(ocp, 11).with_(
+        t=t,
+        x=np.zeros((count + 1, 2)),
+        costate=np.zeros((count + 1, 2)),
+        u=u,
+        breaks=np.arange(count + 1),
+    )
+    assert arcs_of(answer) == ()
+    with pytest.raises(NoEstimateError, match="no control is at a bound"):
+        by_arcs(answer)
+
+
+def test_names_of_the_problem_may_be_those_of_the_arcs():
+    ocp = double_integrator_minimum_time()
+    ends = [replace(c, name=f"end {k}") for k, c in enumerate(ocp.constraints)]
+    ends[0] = replace(ends[0], name="horizon")
+    other = Constraint("horizon of the arcs", ocp.model.x, -9.0, 9.0, at="terminal")
+    arc = Parameter("arc", ca.SX.sym("arc"), 1.0)
+    taken = replace(ocp, constraints=(*ends, other), parameters=(arc,))
+    stretched = Stretched(*fewest(taken)).ocp
+    assert {entry.name for entry in stretched.parameters} == {"arc", "arc of the arcs"}
+    last = stretched.constraints[-1]
+    assert last.name == "horizon of the arcs of the arcs"
 
 
 def test_signals_and_free_starts_are_refused():

@@ -37,6 +37,25 @@ def test_starts_again_from_a_finer_grid_where_newton_fails() -> None:
     assert extremal.work.rollouts > plain.work.rollouts
 
 
+def test_a_fine_extremal_starts_again_from_a_grid_of_some_hundred_intervals(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its steps are no intervals: 1200 of them would make 4800."""
+    asked, module = [], sys.modules["solvers.polish"]
+
+    def coarse(intervals: int) -> MultipleShooting:
+        asked.append(intervals)
+        return MultipleShooting(20)
+
+    direct = held(case_called("rayleigh"))
+    fine = solve(direct.problem, IndirectShooting(segments=15, steps=1200), guess=direct)
+    monkeypatch.setattr(module, "MultipleShooting", coarse)
+    assert len(fine.t) == 1201
+    out_of_reach = IndirectShooting(segments=15, steps=300, tolerance=1e-300)
+    assert not polish(fine, solver=out_of_reach).status.is_success
+    assert asked == [600]
+
+
 @pytest.mark.slow
 def test_an_extremal_that_finer_steps_lose_is_inaccurate() -> None:
     """Arm 24 passes its obstacle where the cost's curvature jumps: 300 steps are worth 4 digits."""
