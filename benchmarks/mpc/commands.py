@@ -1,6 +1,6 @@
 """``python -m benchmarks mpc`` and ``faults``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import reduce
 from multiprocessing import get_context
@@ -14,7 +14,7 @@ from benchmarks.cases import arm_scenario
 from benchmarks.mpc import cart_pole_loop as cart_pole
 from benchmarks.mpc.dial import HORIZONS, crossings_table, sweep
 from benchmarks.mpc.endings import ENDINGS, loop_with
-from benchmarks.mpc.faults import SUBJECTS, campaign
+from benchmarks.mpc.faults import SUBJECTS, Report, campaign
 from benchmarks.mpc.late import DELAY, delayed_loops
 from benchmarks.mpc.loop_row import LoopRow
 from benchmarks.mpc.mass_loop import DT, receding
@@ -103,19 +103,22 @@ SHORT = {
 def print_faults(console: Console, steps: int, seed: int, workers: int = 1) -> int:
     """Run the campaign in processes of this machine and print it; return 0 if it is clean."""
     shares = {name: max(1, round(_SHARES[name] * steps)) for name in SUBJECTS}
-    reports = []
-    with (
-        ProcessPoolExecutor(workers, get_context("spawn")) as pool,
-        Progress(console=console, transient=True) as bar,
-    ):
+    clean = True
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for name, share in shares.items():
-            task = bar.add_task(f"{name}, {share} steps", total=share)
-            pieces = []
-            for piece in campaign(name, share, seed=seed, executor=pool):
-                bar.advance(task, piece.steps)
-                pieces.append(piece)
-            reports.append(reduce(add, pieces))
-    for report in reports:
-        console.print(faults_table(report))
-        console.print(said(report))
-    return int(not all(report.is_clean for report in reports))
+            report = reduce(add, _pieces(console, name, share, seed, pool))
+            console.print(faults_table(report))
+            console.print(said(report))
+            clean &= report.is_clean
+    return int(not clean)
+
+
+def _pieces(
+    console: Console, name: str, steps: int, seed: int, pool: ProcessPoolExecutor
+) -> Iterator[Report]:
+    """Yield the reports of a campaign's pieces, with a bar of how many steps are done."""
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task(f"{name}, {steps} steps", total=steps)
+        for piece in campaign(name, steps, seed=seed, executor=pool):
+            bar.advance(task, piece.steps)
+            yield piece
