@@ -24,6 +24,8 @@ class Status(Enum):
     COST_ROSE = "stopped because the cost rose; the best iterate is returned: take a smaller step"
     #: Stopped before the tolerance was met.
     ITERATION_LIMIT = "not converged within the iteration limit: raise it or start closer"
+    #: Stopped before the tolerance was met, with the iterate it had.
+    TIME_LIMIT = "not converged within the time limit: raise it or start closer"
     #: A line search or a damped Newton step came to nothing.
     NO_PROGRESS = "no step improves the iterate: start closer, use continuation or a direct method"
     #: A number that is not finite, or iterates without bound.

@@ -19,8 +19,10 @@ _FORCE, _FASTEST, _ASIDE = 2.0, 1.5, 3.0
 _JOINTS = 6.0  # [rad/s]
 _NOWHERE = 50.0  # [m], for the cart
 _OUT_OF_REACH = 2.0  # [m], for the arm
-# A step that has to answer in time gives up early.
-_SOLVER = MultipleShooting(8, backend="fatrop", max_iterations=40, rescue=False)
+# A step that has to answer in time gives up early; fatrop alone would sometimes never do so.
+_SOLVER = MultipleShooting(
+    8, backend="fatrop", max_iterations=40, compiled=True, time_limit=1.0, rescue=False
+)
 _START, _FAR = (2.0, -1.0, -1.0), (5.0, 5.0)
 # Beside the elbow, where the arm can give way, and on the path, where it cannot.
 _BESIDE, _IN_THE_WAY = (0.3, 1.1), (1.25, 1.75)

@@ -88,7 +88,8 @@ def _spoilt(solution: Solution, fault: Fault) -> Solution:
         case "nan answer":
             return solution.with_(u=np.full_like(solution.u, np.nan))
         case "out of bounds":
-            return solution.with_(u=solution.u + np.copysign(1e3, fault.size))
+            # Next to a singular posture the null space hardly moves the joints.
+            return solution.with_(u=solution.u + np.copysign(1e9, fault.size))
     return solution
 
 

@@ -27,6 +27,9 @@ from ocp.solution import Solution
 from ocp.solver import Solver, Start
 from ocp.status import Status
 
+# What a solver may take that sets itself no limit [s]: far more than a control loop has.
+_PATIENCE = 10.0
+
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
 
 
@@ -46,13 +49,17 @@ class MPC:
     3. the ``backup`` law, ``BACKUP``;
     4. ``ControlRefused``.
 
+    Where two runs of the solver in a row bring no good plan, every other one starts afresh, as the
+    first step does, since the last plan may be what leads it astray.
+
     An answer that took longer than ``budget`` came too late for its step: it is not applied
     but remembered, and the next rungs see it as the last plan. Source: thesis Algorithm 3,
     2.2.1; [Mayne et al. 2000].
 
     Args:
         ocp: the problem over one horizon. Its t is absolute time: t0 enters at every step.
-        solver: any solver.
+        solver: any solver. One that has a ``time_limit`` and leaves it open gets 10 s, so that
+            the loop goes on where third-party code does not return.
         dt: sampling interval [s]; need not divide the horizon, since a shifted plan is
             interpolated. For a discrete-time model it is that model's step. The input is held
             for dt: plans whose controls are held for less are applied only in their first part.
@@ -105,7 +112,7 @@ class MPC:
         self.reset()
         self._ladder = Ladder(
             ocp=self.ocp,
-            program=self._fastest.build(self.ocp),
+            program=self._prepared.build(self.ocp),
             applied=self.applied,
             backup=self.backup_law,
             guess=self.guess,
@@ -136,13 +143,18 @@ class MPC:
             raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
 
     @property
-    def _fastest(self) -> Solver:
-        """The solver, compiled where that is wanted and it can be."""
+    def _prepared(self) -> Solver:
+        """The solver as a loop needs it: compiled, where that is wanted, and sure to return."""
         solver = self.solver
-        if not self.compiled or not is_dataclass(solver):
+        if not is_dataclass(solver):
             return solver
-        has_option = any(option.name == "compiled" for option in fields(solver))
-        return replace(solver, compiled=True) if has_option else solver
+        options = {option.name: getattr(solver, option.name) for option in fields(solver)}
+        wanted: dict[str, Any] = {}
+        if self.compiled and "compiled" in options:
+            wanted["compiled"] = True
+        if "time_limit" in options and options["time_limit"] is None:
+            wanted["time_limit"] = _PATIENCE
+        return replace(solver, **wanted)
 
     @property
     def remembers(self) -> bool:
@@ -196,7 +208,9 @@ class MPC:
         new = ladder.new(moment, plan) if plan is not None and not late else None
         choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self._last)
         good = plan if late or new is not None else None
-        self.memory = self.memory.after(choice and choice.input, good, self.steps_late)
+        self.memory = self.memory.after(
+            choice and choice.input, good, self.steps_late, tried=moment.is_solvable
+        )
         said = _account(moment, plan, status, late, perf_counter() - started)
         if choice is None:
             raise ControlRefused(f"t = {t:g} s: {said['message']}", Attempt(**said))
@@ -264,6 +278,7 @@ class MPC:
             values=values,
             since=since,
             is_informed=not why,
+            starts_afresh=self.memory.starts_afresh,
             reasons=why,
         )
 

@@ -27,6 +27,7 @@ _USABLE = frozenset(
         Status.SMALL_DECREASE,
         Status.COST_ROSE,
         Status.ITERATION_LIMIT,
+        Status.TIME_LIMIT,
         Status.NO_PROGRESS,
         # A measured state may violate what from the next node on can be met.
         Status.INFEASIBLE,
@@ -51,6 +52,7 @@ class Moment(NamedTuple):
         since: where that horizon begins [s]: at ``at``, or where the last plan began.
         is_informed: False where nobody could say the parameters of the horizon from ``at`` on,
             and those of the last plan stand in as far as they reach.
+        starts_afresh: whether the solver is not to start from the last plan.
         reasons: why the rungs above do not hold, in words; grows on the way down.
     """
 
@@ -62,7 +64,13 @@ class Moment(NamedTuple):
     values: ParameterValues
     since: float
     is_informed: bool
+    starts_afresh: bool
     reasons: list[str]
+
+    @property
+    def is_solvable(self) -> bool:
+        """Whether a solver has what it needs."""
+        return self.is_measured and self.is_informed
 
 
 class Choice(NamedTuple):
@@ -110,9 +118,9 @@ class Ladder:
         """Return a new plan that meets the constraints, and how the solver ended."""
         if not moment.is_measured:
             moment.reasons.append("the measurement is not finite")
-        if not (moment.is_measured and moment.is_informed):
+        if not moment.is_solvable:
             return None, None
-        last = moment.plan
+        last = None if moment.starts_afresh else moment.plan
         try:
             plan = self.program.run(
                 x0=moment.start,

@@ -87,6 +87,11 @@ class Record(NamedTuple):
     age: int
     time_used: float
 
+    @property
+    def is_solvable(self) -> bool:
+        """Whether the solver had what it needs."""
+        return self.is_informed and bool(np.isfinite(self.measured).all())
+
 
 def header(
     problem: str, solver: str, parameters: Sequence[str], acting: np.ndarray | None

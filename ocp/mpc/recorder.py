@@ -135,7 +135,9 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
             if k in wanted:
                 wanted.remove(k)
                 yield found
-        memory = memory.after(record.input, _plan(mpc, record), mpc.steps_late)
+        memory = memory.after(
+            record.input, _plan(mpc, record), mpc.steps_late, tried=record.is_solvable
+        )
     if wanted:
         raise ProblemError(f"{path} has no step {min(wanted)}")
 

@@ -59,6 +59,7 @@ class Collocation(Solver):
             dynamics, integrated from node to node, miss the polynomial; an answer beyond it is
             ``INACCURATE``. ``refined`` finds a mesh that meets it.
         verbose: let the backend print.
+        time_limit: for each run of the backend [s]; None: unlimited.
     """
 
     intervals: int = 25
@@ -69,6 +70,7 @@ class Collocation(Solver):
     max_iterations: int = 300
     accuracy: float = 1e-2
     verbose: bool = False
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -88,7 +90,12 @@ class Collocation(Solver):
     @property
     def options(self) -> Backend:
         """The backend with its options."""
-        return Backend("ipopt", self.tolerance, self.max_iterations, self.verbose)
+        return Backend(
+            tolerance=self.tolerance,
+            max_iterations=self.max_iterations,
+            verbose=self.verbose,
+            time_limit=self.time_limit,
+        )
 
     def build(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.

@@ -1,5 +1,6 @@
 """The nonlinear programming backends: their options, and answers that are always finite."""
 
+import warnings
 from contextlib import nullcontext, redirect_stderr
 from dataclasses import dataclass
 from io import StringIO
@@ -9,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import ProblemError, Transcription, UnsupportedProblem, Work, positive, whole
+from solvers.direct.apart import POSSIBLE, Apart, Lost
 from solvers.direct.transcribed import Transcribed
 
 
@@ -21,12 +23,17 @@ class Backend:
         tolerance: of the optimality conditions.
         max_iterations: limit.
         verbose: let it print.
+        time_limit: for one run [s]; None: unlimited. IPOPT looks at the clock in each iteration
+            and returns its iterate. fatrop knows no clock, and for ever tries to solve a linear
+            system that has no solution, whatever the limit of iterations: it runs in a process
+            of its own then, see ``Apart``, and one that is ended has nothing to show.
     """
 
     name: Literal["ipopt", "fatrop"] = "ipopt"
     tolerance: float = 1e-9
     max_iterations: int = 300
     verbose: bool = False
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -34,6 +41,8 @@ class Backend:
             raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
         whole(self.max_iterations, "a backend's max_iterations")
         positive(self.tolerance, "a backend's tolerance")
+        if self.time_limit is not None:
+            positive(self.time_limit, "a backend's time_limit [s]")
 
     def build(self, transcription: Transcribed) -> "Nlp":
         """Set the backend up for a transcribed problem.
@@ -50,12 +59,26 @@ class Backend:
             f"{self.name}.max_iter": self.max_iterations,
         }
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
-        return Nlp(function, self.verbose)
+        return Nlp(function, self.verbose, self._apart(function))
+
+    def _apart(self, function: ca.Function) -> Apart | None:
+        """Return the process for a backend that may not return, where one is wanted."""
+        if self.name != "fatrop" or self.time_limit is None:
+            return None
+        if not POSSIBLE:
+            warnings.warn(
+                "a time limit of fatrop needs fork and alarms, which this system lacks: "
+                "it runs without one",
+                stacklevel=2,
+            )
+            return None
+        return Apart(function, self.time_limit, verbose=self.verbose)
 
     def _ipopt(self) -> dict[str, Any]:
+        clock = {} if self.time_limit is None else {"ipopt.max_wall_time": self.time_limit}
         # IPOPT otherwise returns controls outside their bounds, by up to 1e-8 relative.
         relax = {"ipopt.bound_relax_factor": 0.0}
-        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax}
+        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock}
 
     def _fatrop(self, transcription: Transcribed) -> dict[str, Any]:
         if not isinstance(transcription, Transcription):
@@ -75,10 +98,12 @@ class Nlp:
     Attributes:
         function: the ``casadi.nlpsol``.
         verbose: whether it may print.
+        apart: the process that it runs in; None: this one.
     """
 
     function: ca.Function
     verbose: bool
+    apart: Apart | None = None
 
     def solve(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> "Answer":
         """Run it; where a number comes back that is not finite, return the first iterate.
@@ -88,21 +113,26 @@ class Nlp:
             p: data of the problem.
             bounds: lbx, ubx, lbg, ubg.
         """
+        inputs = {"x0": w0, "p": p, **bounds}
         try:
-            # CasADi warns of multipliers that are not finite, whatever its options say.
-            with nullcontext() if self.verbose else redirect_stderr(StringIO()):
-                raw = {
-                    k: np.array(v).ravel() for k, v in self.function(x0=w0, p=p, **bounds).items()
-                }
+            raw, stats = self.apart(inputs) if self.apart else self._here(inputs)
         except RuntimeError:  # fatrop throws where functions are not finite
             stats = {"return_status": "it threw an exception", "success": False}
             return Answer.nothing(w0, len(bounds["lbg"]), stats)
-        stats = self.function.stats()
+        except Lost as loss:
+            stats = {"return_status": str(loss), "success": False}
+            return Answer.nothing(w0, len(bounds["lbg"]), stats, is_lost=True)
         if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
             return Answer.nothing(w0, len(bounds["lbg"]), stats)
         # The interior point may sit outside a bound by rounding; what is returned does not.
         w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
         return Answer(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
+
+    def _here(self, inputs: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        # CasADi warns of multipliers that are not finite, whatever its options say.
+        with nullcontext() if self.verbose else redirect_stderr(StringIO()):
+            raw = {name: np.array(value).ravel() for name, value in self.function(**inputs).items()}
+        return raw, self.function.stats()
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +146,7 @@ class Answer:
         lam_x: multipliers of the bounds.
         lam_g: multipliers of the constraints.
         stats: the backend's own words.
+        is_lost: whether there is no answer, since its process was ended.
     """
 
     w: np.ndarray
@@ -124,12 +155,15 @@ class Answer:
     lam_x: np.ndarray
     lam_g: np.ndarray
     stats: dict[str, Any]
+    is_lost: bool = False
 
     @classmethod
-    def nothing(cls, w0: np.ndarray, rows: int, stats: dict[str, Any]) -> "Answer":
+    def nothing(
+        cls, w0: np.ndarray, rows: int, stats: dict[str, Any], *, is_lost: bool = False
+    ) -> "Answer":
         """Return the first iterate, where the backend has nothing to show."""
         zeros = np.zeros(rows)
-        return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats)
+        return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats, is_lost)
 
     @property
     def success(self) -> bool:

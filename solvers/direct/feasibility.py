@@ -27,9 +27,11 @@ class Feasibility:
 
     Attributes:
         transcription: the problem on its grid.
+        time_limit: for a search [s]; None: unlimited.
     """
 
     transcription: Transcribed
+    time_limit: float | None = None
 
     @cached_property
     def _soft(self) -> np.ndarray:
@@ -58,6 +60,8 @@ class Feasibility:
             "ipopt.sb": "yes",
             "ipopt.max_iter": 300,
         }
+        if self.time_limit is not None:
+            options["ipopt.max_wall_time"] = self.time_limit
         return ca.nlpsol("elastic", "ipopt", {**nlp, "p": program["p"]}, options)
 
     def least_violating(

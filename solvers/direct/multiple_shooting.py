@@ -45,6 +45,9 @@ class MultipleShooting(Solver):
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
+        time_limit: for each run of the backend [s]; None: unlimited. fatrop may never return from
+            a problem that cannot be solved, and runs in a process of its own where there is a
+            limit. In ``MPC`` the default is 10 s.
         rescue: where the search fails, look for the least violating trajectory: it tells an
             infeasible problem from a lost search and is a better start for a second one. It may
             cost 300 iterations; a controller that has to answer in time does without.
@@ -58,6 +61,7 @@ class MultipleShooting(Solver):
     accuracy: float = 1e-2
     verbose: bool = False
     compiled: bool = False
+    time_limit: float | None = None
     rescue: bool = True
 
     def __post_init__(self) -> None:
@@ -70,7 +74,13 @@ class MultipleShooting(Solver):
     @property
     def options(self) -> Backend:
         """The backend with its options."""
-        return Backend(self.backend, self.tolerance, self.max_iterations, self.verbose)
+        return Backend(
+            name=self.backend,
+            tolerance=self.tolerance,
+            max_iterations=self.max_iterations,
+            verbose=self.verbose,
+            time_limit=self.time_limit,
+        )
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

@@ -87,7 +87,7 @@ class Search:
 
     @cached_property
     def _feasibility(self) -> Feasibility:
-        return Feasibility(self.transcription)
+        return Feasibility(self.transcription, self.options.time_limit)
 
     def solve(self, w0: np.ndarray, data: Data) -> Found:
         """Solve for these data from a first iterate, which is clipped to the bounds."""
@@ -131,6 +131,8 @@ class Search:
         self, answer: Answer, data: Data, bounds: dict[str, np.ndarray]
     ) -> tuple[Status, str]:
         """Status from the backend's word, the constraints themselves and the integrator."""
+        if answer.is_lost:
+            return Status.FAILED, f"{self.options.name} {answer.word}"
         if not np.isfinite(answer.cost):
             return Status.DIVERGED, f"the backend met a number that is not finite ({answer.word})"
         violation, row = self.transcription.worst(answer.w, answer.g, bounds)
@@ -146,6 +148,8 @@ class Search:
             return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t:.4g} s"
         if answer.count >= self.options.max_iterations:
             return Status.ITERATION_LIMIT, where
+        if answer.word == "Maximum_WallTime_Exceeded":
+            return Status.TIME_LIMIT, where
         if answer.word == "Diverging_Iterates":
             return Status.DIVERGED, where or "the cost may be unbounded below"
         return Status.FAILED, f"{self.options.name} says {answer.word}. {where}".strip()
@@ -165,6 +169,7 @@ class Search:
 # An optimiser that cannot meet a constraint may also exploit the integrator's error to do so.
 _MAYBE_INFEASIBLE = (
     Status.ITERATION_LIMIT,
+    Status.TIME_LIMIT,
     Status.FAILED,
     Status.INACCURATE,
 )

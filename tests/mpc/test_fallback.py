@@ -137,7 +137,7 @@ def test_the_law_in_force_is_seen():
 
 def test_none_refuses_even_where_an_input_could_be_held():
     mpc = replace(always_failing(cart(), backup=None))
-    mpc.memory = mpc.memory.after(np.array([1.0]), None, 0)
+    mpc.memory = mpc.memory.after(np.array([1.0]), None, 0, tried=True)
     with pytest.raises(ControlRefused, match="there is no backup law"):
         mpc.step([0.5, 0.0], 0.0)
     holding = replace(mpc, backup="hold")

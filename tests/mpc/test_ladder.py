@@ -1,6 +1,6 @@
 """The driver never lies and never stops: every rung of the ladder, and the way back."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from ocp import (
     MPC,
+    OCP,
     Applied,
     Box,
     Constraint,
@@ -16,7 +17,10 @@ from ocp import (
     Outcome,
     Plant,
     ProblemError,
+    Program,
     Solution,
+    Solver,
+    Start,
     Status,
 )
 from solvers import MultipleShooting
@@ -76,6 +80,55 @@ def test_a_failure_takes_the_shifted_plan_and_names_itself(change: Change, word:
     undisturbed = loop(controller())
     # Plant and model agree, so following the old plan for two steps changes next to nothing.
     assert rollout.cost == pytest.approx(undisturbed.cost, rel=1e-3)
+
+
+@dataclass(frozen=True)
+class Watched(Solver):
+    """Notes what each run starts from."""
+
+    inner: Solver
+    seen: list[Start | None] = field(default_factory=list)
+
+    def build(self, ocp: OCP) -> "WatchedProgram":
+        return WatchedProgram(self.seen, self.inner.build(ocp))
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedProgram(Program):
+    seen: list[Start | None]
+    inner: Program
+
+    def run(self, *, guess: Start | None = None, **data) -> Solution:
+        self.seen.append(guess)
+        return self.inner.run(guess=guess, **data)
+
+
+def test_a_plan_that_leads_astray_is_no_start_for_ever() -> None:
+    """A failure may be an accident; after two, every other run starts as the first step does."""
+    bad = {round(DT * k, 2): becomes(Status.DIVERGED) for k in (2, 3, 4, 5, 6, 8)}
+    watched = Watched(scripted(bad))
+    mpc = MPC(ocp=cart(), solver=watched, dt=DT)
+    rollout = loop(mpc, 1.2)
+    assert [k for k, guess in enumerate(watched.seen) if guess is None] == [0, 4, 6]
+    assert rollout.outcomes[7] is Outcome.OPTIMAL
+
+
+def test_what_is_not_measured_is_no_failure_of_the_plan() -> None:
+    watched = Watched(scripted({}))
+    mpc = MPC(ocp=cart(), solver=watched, dt=DT)
+    mpc.step([1.0, 0.0], 0.0)
+    for k in (1, 2):
+        mpc.step([np.nan, 0.0], DT * k)
+    mpc.step([0.9, -0.3], 3 * DT)
+    assert [guess is None for guess in watched.seen] == [True, False]
+
+
+def test_a_solver_without_a_limit_gets_one() -> None:
+    for own, used in ((None, 10.0), (0.5, 0.5)):
+        solver = MultipleShooting(10, time_limit=own)
+        mpc = MPC(ocp=cart(), solver=solver, dt=DT, compiled=False)
+        assert mpc.solver is solver
+        assert mpc._prepared == replace(solver, time_limit=used)
 
 
 def test_a_small_excess_is_clipped_and_recorded() -> None:
