@@ -62,7 +62,8 @@ def contenders(intervals: int = N) -> dict[str, Solver]:
     """Return the solvers that are compared, by name."""
     return {
         "direct, ipopt": MultipleShooting(intervals),
-        "direct, fatrop": MultipleShooting(intervals, backend="fatrop"),
+        # In this process, whose time is measured.
+        "direct, fatrop": MultipleShooting(intervals, backend="fatrop", time_limit=np.inf),
         "stagewise Newton": StagewiseNewton(intervals),
         "indirect": IndirectShooting(segments=5, steps=intervals),
         "gradient": Schuetz.sound(intervals=intervals),
@@ -75,37 +76,76 @@ def stagewise() -> dict[str, Solver]:
     return {name: solver for name, solver in contenders().items() if name in names}
 
 
-def arm_steps(
-    solvers: Mapping[str, Solver], ocp: OCP, count: int, stages: Sequence[bool] = (False, True)
-) -> list[Steps]:
-    """Let every solver, interpreted and compiled, decide ``count`` steps of one motion in turns.
+@dataclass(frozen=True)
+class Field:
+    """Contenders on one problem.
 
-    The motion is that of the first contender; everybody sees it with the same noise.
+    Attributes:
+        ocp: the problem.
+        solvers: by name.
+        stages: whether they are compiled; both by default.
     """
-    guess = solve(ocp, MultipleShooting(N, compiled=True)).or_raise()
-    racing = {
-        (name, compiled): MPC(
-            ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"), guess=guess, compiled=compiled
-        )
-        for name, solver in solvers.items()
-        for compiled in stages
-    }
-    times: dict[tuple[str, bool], list[float]] = {key: [] for key in racing}
-    planned = dict.fromkeys(racing, 0)
-    x, rng = ocp.start(), np.random.default_rng(0)
-    for k in range(count + _WARM):
-        measured, rates = x + NOISE * rng.normal(size=x.shape), []
-        for key, mpc in racing.items():
+
+    ocp: OCP
+    solvers: Mapping[str, Solver]
+    stages: Sequence[bool] = (False, True)
+
+    def line_up(self) -> "Racing":
+        """Build the controllers."""
+        guess = solve(self.ocp, MultipleShooting(N, compiled=True)).or_raise()
+        applied = Applied("rate")
+        racing = {
+            (name, compiled): MPC(
+                ocp=self.ocp, solver=solver, dt=DT, applied=applied, guess=guess, compiled=compiled
+            )
+            for name, solver in self.solvers.items()
+            for compiled in self.stages
+        }
+        return Racing(racing, self.ocp.start())
+
+
+class Racing:
+    """The contenders of a field on their way; the motion is that of the first one."""
+
+    def __init__(self, racing: Mapping[tuple[str, bool], MPC], x: np.ndarray) -> None:
+        """Put them at the start."""
+        self._racing, self._x = racing, x
+        self._times: dict[tuple[str, bool], list[float]] = {key: [] for key in racing}
+        self._planned = dict.fromkeys(racing, 0)
+        self._rng = np.random.default_rng(0)
+
+    def step(self, k: int) -> None:
+        """Let everybody decide in turns, for the same measured state."""
+        measured = self._x + NOISE * self._rng.normal(size=self._x.shape)
+        rates = []
+        for key, mpc in self._racing.items():
             started = process_time()
             decision = mpc.step(measured, k * DT)
-            times[key].append(process_time() - started)
-            planned[key] += k >= _WARM and decision.outcome in (Outcome.OPTIMAL, Outcome.FEASIBLE)
+            self._times[key].append(process_time() - started)
+            is_new = decision.outcome in (Outcome.OPTIMAL, Outcome.FEASIBLE)
+            self._planned[key] += k >= _WARM and is_new
             rates.append(decision.input)
-        x = x + DT * rates[0]
-    return [
-        Steps(name, compiled, tuple(times[name, compiled][_WARM:]), planned[name, compiled] / count)
-        for name, compiled in racing
-    ]
+        self._x = self._x + DT * rates[0]
+
+    def results(self) -> list[Steps]:
+        """Return what was measured, without the first steps."""
+        return [
+            Steps(*key, tuple(times := self._times[key][_WARM:]), self._planned[key] / len(times))
+            for key in self._racing
+        ]
+
+
+def race(fields: Mapping[int, Field], count: int) -> dict[int, list[Steps]]:
+    """Let the contenders of all fields decide ``count`` steps.
+
+    The fields take turns too: a processor changes its clock within seconds, and what grows over
+    the keys must not be that.
+    """
+    racing = {key: field.line_up() for key, field in fields.items()}
+    for k in range(count + _WARM):
+        for group in racing.values():
+            group.step(k)
+    return {key: group.results() for key, group in racing.items()}
 
 
 def exponent(sizes: tuple[int, ...], times: tuple[float, ...]) -> float:

@@ -8,12 +8,13 @@ from rich.table import Table
 from benchmarks.speed.arm import (
     INTERVALS,
     LINKS,
+    Field,
     N,
     Steps,
     arm,
-    arm_steps,
     contenders,
     exponent,
+    race,
     stagewise,
 )
 from benchmarks.speed.driver_overhead import driver_overhead, overhead_table
@@ -37,13 +38,13 @@ def print_arm_speed(
 def _print_steps(
     console: Console, intervals: Sequence[int], links: Sequence[int], count: int
 ) -> None:
-    console.print(ratio_table(arm_steps(contenders(), arm(), count)))
+    console.print(ratio_table(race({N: Field(arm(), contenders())}, count)[N]))
     if intervals:
-        grown = {n: arm_steps(contenders(n), arm(), count) for n in intervals}
+        grown = race({n: Field(arm(), contenders(n)) for n in intervals}, count)
         console.print(growth_table(grown, "3 links: one step in ms over the intervals N"))
     if links:
         # Interpreted, and for the other solvers, ten links take minutes.
-        grown = {n: arm_steps(stagewise(), arm(n), count, (True,)) for n in links}
+        grown = race({n: Field(arm(n), stagewise(), (True,)) for n in links}, count)
         console.print(growth_table(grown, f"N = {N}: one step in ms over the links"))
         console.print(code_table([StageCode.of(n) for n in links]))
 

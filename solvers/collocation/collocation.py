@@ -59,7 +59,8 @@ class Collocation(Solver):
             dynamics, integrated from node to node, miss the polynomial; an answer beyond it is
             ``INACCURATE``. ``refined`` finds a mesh that meets it.
         verbose: let the backend print.
-        time_limit: for each run of the backend [s]; None: unlimited.
+        time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in
+            ``MPC``.
     """
 
     intervals: int = 25
@@ -94,7 +95,7 @@ class Collocation(Solver):
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
             verbose=self.verbose,
-            time_limit=self.time_limit,
+            time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
     def build(self, ocp: OCP) -> "CollocationProgram":

@@ -23,17 +23,17 @@ class Backend:
         tolerance: of the optimality conditions.
         max_iterations: limit.
         verbose: let it print.
-        time_limit: for one run [s]; None: unlimited. IPOPT looks at the clock in each iteration
-            and returns its iterate. fatrop knows no clock, and for ever tries to solve a linear
-            system that has no solution, whatever the limit of iterations: it runs in a process
-            of its own then, see ``Apart``, and one that is ended has nothing to show.
+        time_limit: for one run [s]. IPOPT looks at the clock in each iteration and returns its
+            iterate. fatrop knows no clock, and for ever tries to solve a linear system that has
+            no solution, whatever the limit of iterations: where it is limited it runs in a
+            process of its own, see ``Apart``, and once ended it has nothing to show.
     """
 
     name: Literal["ipopt", "fatrop"] = "ipopt"
     tolerance: float = 1e-9
     max_iterations: int = 300
     verbose: bool = False
-    time_limit: float | None = None
+    time_limit: float = np.inf
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -41,8 +41,7 @@ class Backend:
             raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
         whole(self.max_iterations, "a backend's max_iterations")
         positive(self.tolerance, "a backend's tolerance")
-        if self.time_limit is not None:
-            positive(self.time_limit, "a backend's time_limit [s]")
+        positive(self.time_limit, "a backend's time_limit [s]", finite=False)
 
     def build(self, transcription: Transcribed) -> "Nlp":
         """Set the backend up for a transcribed problem.
@@ -63,7 +62,7 @@ class Backend:
 
     def _apart(self, function: ca.Function) -> Apart | None:
         """Return the process for a backend that may not return, where one is wanted."""
-        if self.name != "fatrop" or self.time_limit is None:
+        if self.name != "fatrop" or self.time_limit == np.inf:
             return None
         if not POSSIBLE:
             warnings.warn(
@@ -75,7 +74,7 @@ class Backend:
         return Apart(function, self.time_limit, verbose=self.verbose)
 
     def _ipopt(self) -> dict[str, Any]:
-        clock = {} if self.time_limit is None else {"ipopt.max_wall_time": self.time_limit}
+        clock = {"ipopt.max_wall_time": self.time_limit} if self.time_limit < np.inf else {}
         # IPOPT otherwise returns controls outside their bounds, by up to 1e-8 relative.
         relax = {"ipopt.bound_relax_factor": 0.0}
         return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock}

@@ -27,11 +27,11 @@ class Feasibility:
 
     Attributes:
         transcription: the problem on its grid.
-        time_limit: for a search [s]; None: unlimited.
+        time_limit: for a search [s].
     """
 
     transcription: Transcribed
-    time_limit: float | None = None
+    time_limit: float = np.inf
 
     @cached_property
     def _soft(self) -> np.ndarray:
@@ -60,7 +60,7 @@ class Feasibility:
             "ipopt.sb": "yes",
             "ipopt.max_iter": 300,
         }
-        if self.time_limit is not None:
+        if self.time_limit < np.inf:
             options["ipopt.max_wall_time"] = self.time_limit
         return ca.nlpsol("elastic", "ipopt", {**nlp, "p": program["p"]}, options)
 

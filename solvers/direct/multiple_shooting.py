@@ -45,9 +45,9 @@ class MultipleShooting(Solver):
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
-        time_limit: for each run of the backend [s]; None: unlimited. fatrop may never return from
-            a problem that cannot be solved, and runs in a process of its own where there is a
-            limit. In ``MPC`` the default is 10 s.
+        time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in
+            ``MPC``. fatrop may never return from a problem that cannot be solved, and runs in a
+            process of its own where there is a limit.
         rescue: where the search fails, look for the least violating trajectory: it tells an
             infeasible problem from a lost search and is a better start for a second one. It may
             cost 300 iterations; a controller that has to answer in time does without.
@@ -79,7 +79,7 @@ class MultipleShooting(Solver):
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
             verbose=self.verbose,
-            time_limit=self.time_limit,
+            time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.speed.arm import Steps, arm, arm_steps, exponent
+from benchmarks.speed.arm import Field, Steps, arm, exponent, race, stagewise
 from benchmarks.speed.arm_tables import growth_table, ratio_table
 from benchmarks.speed.driver_overhead import driver_overhead, overhead_table
 from benchmarks.speed.stage_code import StageCode, code_table
@@ -24,10 +24,16 @@ def test_exponent_is_the_slope_in_the_logarithms():
 
 @pytest.mark.slow
 def test_interpreted_and_compiled_steps_are_both_planned():
-    steps = arm_steps({"gradient": Schuetz.sound(intervals=8)}, arm(), 3)
-    assert [s.compiled for s in steps] == [False, True]
-    assert all(s.planned == 1.0 and len(s.times) == 3 for s in steps)
-    assert growth_table({8: steps}, "one size").row_count == 2
+    fields = {n: Field(arm(), {"gradient": Schuetz.sound(intervals=n)}) for n in (6, 8)}
+    grown = race(fields, 3)
+    for steps in grown.values():
+        assert [s.compiled for s in steps] == [False, True]
+        assert all(s.planned == 1.0 and len(s.times) == 3 for s in steps)
+    assert growth_table(grown, "two sizes").row_count == 2
+
+
+def test_the_time_of_a_step_is_all_in_this_process():
+    assert not any(getattr(s, "time_limit", 0.0) is None for s in stagewise().values())
 
 
 def test_the_drivers_own_time_is_told():

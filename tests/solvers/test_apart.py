@@ -197,11 +197,17 @@ def _without_rescue(solver: object) -> dict[str, bool]:
     return {"rescue": False} if isinstance(solver, MultipleShooting) else {}
 
 
-@pytest.mark.parametrize("limit", [0.0, -1.0, np.nan, np.inf, "soon"])
+@pytest.mark.parametrize("limit", [0.0, -1.0, np.nan, "soon"])
 @pytest.mark.parametrize("solver", [MultipleShooting, Collocation])
 def test_a_time_limit_is_a_positive_number(solver: Callable[..., object], limit) -> None:
     with pytest.raises(ProblemError, match="time_limit"):
         solver(time_limit=limit)
+
+
+def test_without_a_limit_fatrop_runs_here() -> None:
+    for limit in (None, np.inf):
+        solver = MultipleShooting(10, backend="fatrop", time_limit=limit)
+        assert solver.build(cart()).search.nlp.apart is None
 
 
 def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
