@@ -12,6 +12,7 @@ from ocp.errors import ProblemError
 from ocp.expressions import column, instance, numbers
 
 Place = Literal["path", "initial", "terminal"]
+_RELATIONS = (ca.OP_LE, ca.OP_LT, ca.OP_EQ, ca.OP_NE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,9 @@ class Constraint:
         upper: number or (m,).
         at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
             manifold, and ``x0`` a guess) or ``"terminal"``.
+
+    Raises:
+        ProblemError: naming the constraint and what is wrong with place, expression or bounds.
     """
 
     name: str
@@ -77,8 +81,17 @@ class Constraint:
         """Stack the expression and size the bounds."""
         instance(self.name, str, "the name of a constraint")
         if self.at not in ("path", "initial", "terminal"):
-            raise ProblemError(f"constraint '{self.name}': at = {self.at!r} is no place")
+            raise ProblemError(
+                f"constraint '{self.name}': at = {self.at!r} is no place; "
+                "'path', 'initial' and 'terminal' are"
+            )
         expression = column(self.expression, f"constraint '{self.name}'")
+        for row in ca.vertsplit(expression):
+            if row.op() in _RELATIONS:
+                raise ProblemError(
+                    f"constraint '{self.name}': {row} is true or false, not a value between "
+                    "bounds; write Constraint(name, expression, lower, upper)"
+                )
         box = Box(self.lower, self.upper).sized(expression.numel(), f"constraint '{self.name}'")
         object.__setattr__(self, "expression", expression)
         object.__setattr__(self, "lower", box.lower)

@@ -1,5 +1,6 @@
 """A problem in mathematics, as text for a person."""
 
+import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 # An expression longer than this says less than its dimensions do.
 _READABLE = 100
+# CasADi names what occurs twice, numbers too: "@1=1, (x+(@1-y))".
+_NAMED_NUMBER = re.compile(r"(@\d+)=(-?[\d.]+(?:e[-+]?\d+)?), ")
 
 
 def describe(ocp: "OCP") -> str:
@@ -25,7 +28,7 @@ def _lines(ocp: "OCP") -> Iterable[str]:
     m = ocp.model
     discrete = m.is_discrete
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
-    yield f"{ocp.name}   ({m.name}: {m.nx} states, {m.nu} controls)"
+    yield f"{ocp.name}   ({m.name}: {_count(m.nx, 'state')}, {_count(m.nu, 'control')})"
     yield ""
     stage = f"sum k=0..{ocp.steps - 1} of L" if ocp.steps is not None else f"int 0..{tf} L dt"
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
@@ -52,11 +55,21 @@ def _lines(ocp: "OCP") -> Iterable[str]:
 
 def readable(expression: ca.SX) -> str:
     """Return a short expression in full, and what a long one depends on."""
-    text = str(expression)
+    text = _with_numbers(str(expression))
     if len(text) <= _READABLE and "@" not in text:
         return text
     symbols = ", ".join(str(s) for s in ca.symvar(expression))
     return f"[{ca.n_nodes(expression)} nodes] of ({symbols})"
+
+
+def _with_numbers(text: str) -> str:
+    """Write numbers that have a name where they occur."""
+    values = dict(_NAMED_NUMBER.findall(text))
+    return re.sub(r"@\d+", lambda name: values.get(name[0], name[0]), _NAMED_NUMBER.sub("", text))
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _bounds(box: Box, names: tuple[str, ...], units: tuple[str, ...]) -> Iterable[str]:

@@ -14,10 +14,15 @@ Expression = ca.SX | ca.DM | float | int | np.ndarray | Sequence
 def require_symbols(symbols: ca.SX, what: str) -> None:
     """Raise unless ``symbols`` is a column of distinct ``SX`` symbols."""
     if not isinstance(symbols, ca.SX):
-        raise ProblemError(f"{what} is a {type(symbols).__name__}; write it with casadi.SX.sym")
-    if symbols.shape[1] != 1 or not symbols.is_dense() or not symbols.is_valid_input():
+        raise ProblemError(f"{what} is {_named(symbols)}; write it with casadi.SX.sym")
+    if symbols.shape[1] != 1 or not symbols.is_dense():
         raise ProblemError(
             f"{what} must be a dense column of symbols, it has shape {symbols.shape}"
+        )
+    composed = [element for element in ca.vertsplit(symbols) if not element.is_symbolic()]
+    if composed:
+        raise ProblemError(
+            f"{what} must be a dense column of symbols, {composed[0]} is an expression"
         )
     if len({element.element_hash() for element in ca.vertsplit(symbols)}) < symbols.numel():
         raise ProblemError(
@@ -37,8 +42,9 @@ def column(expression: Expression, what: str) -> ca.SX:
             expression = ca.vertcat(*expression)
         result = ca.SX(expression)
     except (TypeError, ValueError, NotImplementedError) as error:
-        kind = type(expression).__name__
-        raise ProblemError(f"{what} is a {kind} that is no casadi.SX expression") from error
+        raise ProblemError(
+            f"{what} is {_named(expression)} that is no casadi.SX expression"
+        ) from error
     if result.shape[1] != 1 and result.shape[0] != 1:
         raise ProblemError(f"{what} has shape {result.shape}, a column is needed")
     return ca.densify(ca.vec(result))
@@ -59,8 +65,8 @@ def refuse_foreign_symbols(expression: ca.SX, allowed: Sequence[ca.SX], what: st
     if foreign:
         raise ProblemError(
             f"{what} contains {', '.join(sorted(foreign))}, unknown at this place: "
-            "it must be a state, a control, t or a declared parameter "
-            "(no controls in initial or terminal terms)"
+            "it must be a state, a control, the time given as Model(t=...) or a declared "
+            "parameter (no controls in initial or terminal terms)"
         )
 
 
@@ -121,7 +127,10 @@ def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
 
 
 def _named(value: object) -> str:
-    return f"the class {value.__name__}" if isinstance(value, type) else f"a {type(value).__name__}"
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'AEIOUaeiou' or name in ('MX', 'SX') else 'a'} {name}"
 
 
 def _hint(value: object, kind: type | tuple[type, ...]) -> str:

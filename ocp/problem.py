@@ -254,10 +254,10 @@ class OCP:
             raise ProblemError(
                 f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite"
             )
-        if self.model.is_discrete and self.horizon != int(self.horizon):
+        if self.model.is_discrete and not isinstance(self.horizon, int | np.integer):
             raise ProblemError(
-                f"{self.name}: horizon = {self.horizon} of a discrete-time model "
-                "is a number of steps"
+                f"{self.name}: horizon = {self.horizon} of a discrete-time model: it is "
+                "a number of steps, a whole one, and no duration"
             )
 
     def _check_symbols(self) -> None:

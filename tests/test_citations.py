@@ -12,7 +12,7 @@ def test_every_citation_is_listed():
     files = [
         f for p in ("ocp", "models", "solvers", "benchmarks") for f in (ROOT / p).rglob("*.py")
     ]
-    files += [ROOT / "docs" / "theory.md", ROOT / "README.md"]
+    files += [*(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
     cited = {c: f.name for f in files for c in CITATION.findall(f.read_text(encoding="utf-8"))}
     assert len(cited) > 5
     assert {c: f for c, f in cited.items() if c not in listed} == {}

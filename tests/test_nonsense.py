@@ -84,15 +84,15 @@ CALLS: list[tuple[str, Wrong]] = [
     # Functions of a solution.
     ("evaluate: solution is a Refinement, Solution is needed: its .solution is one",
      lambda: evaluate(mesh())),
-    ("evaluate: solution is a OCP, Solution is needed$", lambda: evaluate(problem())),
+    ("evaluate: solution is an OCP, Solution is needed$", lambda: evaluate(problem())),
     ("evaluate: solution is a NoneType", lambda: evaluate(*[None])),
     ("evaluate: tolerance = 0.0, it must be positive", lambda: evaluate(answer(), tolerance=0.0)),
     ("evaluate: tolerance = nan", lambda: evaluate(answer(), tolerance=np.nan)),
     ("evaluate: tolerance = 'tight'", lambda: evaluate(answer(), **{"tolerance": "tight"})),
-    ("costates_along: solution is a OCP", lambda: costates_along(problem())),
-    ("certify: solution is a OCP", lambda: certify(problem())),
-    ("certify: effort is a int", lambda: certify(answer(), *[3])),
-    ("refined: start is a OCP", lambda: refined(problem())),
+    ("costates_along: solution is an OCP", lambda: costates_along(problem())),
+    ("certify: solution is an OCP", lambda: certify(problem())),
+    ("certify: effort is an int", lambda: certify(answer(), *[3])),
+    ("refined: start is an OCP", lambda: refined(problem())),
     ("refined: solver is a MultipleShooting", lambda: refined(answer(), solver=ANY())),
     ("refined: accuracy = 'x'", lambda: refined(answer(), **{"accuracy": "x"})),
     # Functions of a problem and a solver.
@@ -109,12 +109,12 @@ CALLS: list[tuple[str, Wrong]] = [
     ("multistart: amplitude", lambda: multistart(problem(), ANY(), 2, 0, amplitude=np.nan)),
     ("MPC of Van der Pol: dt .* = 'fast'",
      lambda: MPC(ocp=problem(), solver=ANY(10), **{"dt": "fast"})),
-    ("derive: the problem is a int", lambda: derive(*[3])),
+    ("derive: the problem is an int", lambda: derive(*[3])),
     ("hamiltonian: the problem is a Solution", lambda: hamiltonian(answer())),
-    ("linear_quadratic: the problem is a int", lambda: linear_quadratic(*[3])),
-    ("discretise: the problem is a int", lambda: discretise(*[3], 0.1)),
+    ("linear_quadratic: the problem is an int", lambda: linear_quadratic(*[3])),
+    ("discretise: the problem is an int", lambda: discretise(*[3], 0.1)),
     ("the problem to transcribe is a NoneType", lambda: ANY().build(None)),
-    ("the problem to transcribe is a int", lambda: Transcription(*[3], 4, ANY())),
+    ("the problem to transcribe is an int", lambda: Transcription(*[3], 4, ANY())),
     # Where a run starts, and its numbers.
     ("the guess is <class 'numpy.ndarray'>, a Guess",
      lambda: solve(problem(), ANY(10), guess=np.zeros((3, 2)))),  # type: ignore[arg-type]
@@ -137,8 +137,8 @@ CALLS: list[tuple[str, Wrong]] = [
     ("free final time: lower = 'a'", lambda: FreeTime(1.0, *["a"])),
     ("free final time: upper = nan", lambda: FreeTime(1.0, upper=np.nan)),
     ("guess: duration = 'a'", lambda: Guess(**{"duration": "a"})),
-    ("the name of a model is a int", lambda: dynamics(name=3)),
-    ("x_units is a int", lambda: dynamics(x_units=3)),
+    ("the name of a model is an int", lambda: dynamics(name=3)),
+    ("x_units is an int", lambda: dynamics(x_units=3)),
     ("x_units is a str", lambda: dynamics(x_units="ms")),
     ("dt = 'a'", lambda: dynamics(dt="a")),
     ("dt = -1", lambda: dynamics(dt=-1)),
@@ -147,7 +147,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("smoothness = array", lambda: point(smoothness=np.array([1, 2]))),
     ("control_bounds is the class Box, Box is needed: write Box",
      lambda: point(control_bounds=Box)),
-    ("the name of a constraint is a SX", lambda: Constraint(ca.SX.sym("x"), *["c"])),
+    ("the name of a constraint is an SX", lambda: Constraint(ca.SX.sym("x"), *["c"])),
     # Solvers' options.
     ("tolerance = 'a'", lambda: MultipleShooting(**{"tolerance": "a"})),
     ("tolerance = nan", lambda: MultipleShooting(tolerance=np.nan)),
@@ -161,7 +161,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("Greedy: intervals must be a whole", lambda: Greedy(**{"intervals": "a"})),
     ("GridDP: intervals must be a whole", lambda: GridDP(9, **{"intervals": 2.5})),
     # Solutions.
-    ("solution: problem is a int", lambda: answer().with_(problem=3)),
+    ("solution: problem is an int", lambda: answer().with_(problem=3)),
     ("solution: status is a str", lambda: answer().with_(status="SOLVED")),
     ("solution: u is a list", lambda: answer().with_(u=[1, 2])),
     ("solution: t is a str", lambda: answer().with_(t="abc")),
@@ -171,7 +171,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("solution: cost is a str", lambda: answer().with_(cost="a")),
     ("the problem that here.npz is to be a solution of is a str",
      lambda: Solution.load("here.npz", *["Van der Pol"])),
-    ("the path of a saved solution is a OCP", lambda: Solution.load(problem(), problem())),
+    ("the path of a saved solution is an OCP", lambda: Solution.load(problem(), problem())),
 ]  # fmt: skip
 
 

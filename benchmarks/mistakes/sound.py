@@ -23,6 +23,7 @@ SOUND = (
     Sound("pendulum", of.pendulum),
     Sound("lander", of.lander),
     Sound("car", of.car),
+    Sound("car, start at the near side", lambda: of.car(guess=None)),
     Sound("tank", of.tank),
     Sound("regulator", of.regulator),
     Sound("room", of.room),

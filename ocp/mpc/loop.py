@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Constraint
 from ocp.errors import ProblemError
-from ocp.expressions import numbers
+from ocp.expressions import instance, numbers
 from ocp.mpc.decision import Controller, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.plant import Plant, RunningPlant
@@ -57,6 +57,7 @@ def closed_loop(
         ProblemError: if the plant takes another input than the controller sends, the duration is
             no multiple of dt, or a function of the plant returns what does not fit.
     """
+    instance(plant, Plant, "closed loop: plant")
     if not (0.0 < dt < np.inf and np.isfinite(duration)):
         raise ProblemError(f"closed loop: {duration} s in steps of dt = {dt} s is no run")
     steps = round(duration / dt)

@@ -26,8 +26,10 @@ class Plant:
         substeps: steps of RK4 in each sampling interval.
         process_noise: standard deviation of what is added to the state, per root of a second.
         measurement_noise: standard deviation of what is added to each measurement (nx,).
-        disturbance: t -> what is added to the input (m,), unknown to the controller.
-        saturation: of the actuators.
+        disturbance: t -> what is added to the input (m,), unknown to the controller. The sum,
+            clipped to ``saturation``, is what acts, costs, and is held against the bounds of the
+            plant's control: where it is no part of what those limit, leave them out of ``ocp``.
+        saturation: of the actuators; not the control bounds, unless it is given.
         lag: time constant of the actuators [s], 0: none.
         parameters: t -> the value of each parameter and signal at that instant, by name;
             default: the declared ones, of a signal its first sample.
@@ -50,6 +52,11 @@ class Plant:
     def __post_init__(self) -> None:
         """Check the numbers."""
         instance(self.ocp, OCP, "plant: ocp")
+        instance(self.saturation, Box, "plant: saturation")
+        for name in ("disturbance", "parameters"):
+            given = getattr(self, name)
+            if given is not None and not callable(given):
+                raise ProblemError(f"plant: {name} = {given!r}, a function of t is needed")
         whole(self.substeps, "plant: substeps")
         nx, nu = self.ocp.model.nx, self.ocp.model.nu
         for name in ("process_noise", "measurement_noise"):

@@ -40,7 +40,8 @@ class Rollout:
         messages: why, where it was not the first (K,).
         costs: the plant's running cost over each interval (K,).
         violation: the plant's largest violation of a bound or constraint.
-        worst: which, and when; empty where nothing is violated.
+        worst: which, and the end of the sampling interval it happened in; empty where nothing is
+            violated.
         drift: largest violation of the plant's invariants at the sampling instants, such as
             the task error of an arm.
         step_times: time of each decision [s], (K,).

@@ -176,7 +176,7 @@ def _dependent(why: str, ratio: float) -> Check:
 
 def _stationarity(point: _Point) -> Check:
     left = point.slope + point.rows.T @ point.multipliers
-    wrong = np.maximum(0.0, -point.signs * point.multipliers)
+    wrong = np.maximum(0.0, -point.signs * point.multipliers) + 0.0  # no -0.0 in a sentence
     scale = max(1.0, float(np.abs(point.slope).max()))
     worst = max(float(np.abs(left).max()), float(wrong.max(initial=0.0))) / scale
     one_sided = int(np.count_nonzero(point.signs))

@@ -104,7 +104,8 @@ class AugmentedLagrangian(Solver):
         relaxed = Relaxed.of(ocp, self.intervals)
         if not relaxed.path.size + relaxed.end.size:
             raise UnsupportedProblem(
-                f"{ocp.name}: there is no constraint to relax; use {self.inner!r} itself"
+                f"{ocp.name}: there is no path, state or terminal constraint to relax; use "
+                f"{type(self.inner).__name__} itself"
             )
         return AugmentedLagrangianProgram(self, ocp, relaxed, self.inner.build(relaxed.ocp))
 

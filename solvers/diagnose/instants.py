@@ -37,7 +37,8 @@ def _anywhere(subject: Subject, when: str) -> Iterator[Finding]:
     if answer is None:
         return
     conflict = elastic.conflict(answer, np.empty(0))
-    yield _contradiction(elastic, answer, conflict, when, t)
+    if not _met_from_elsewhere(elastic, answer, conflict):
+        yield _contradiction(elastic, answer, conflict, when, t)
 
 
 def _asked(subject: Subject, when: str) -> list[Asked]:
@@ -68,6 +69,19 @@ def _least(subject: Subject, elastic: Elastic) -> Stretched | None:
         if answer.found and (best is None or total < elastic.excess(best).sum()):
             best = answer
     return best
+
+
+def _met_from_elsewhere(elastic: Elastic, answer: Stretched, conflict: tuple[int, ...]) -> bool:
+    """Whether all can be met from where all but one of the conflict are.
+
+    The far side of an obstacle is found from where the end is asked for, not from the start.
+    """
+    nothing, every = np.empty(0), range(len(elastic.demands))
+    for left_out in conflict:
+        others = elastic.solve(answer.w, nothing, [i for i in every if i != left_out])
+        if others.found and elastic.is_possible(elastic.solve(others.w, nothing, every)):
+            return True
+    return False
 
 
 def _contradiction(

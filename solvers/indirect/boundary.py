@@ -13,7 +13,9 @@ def refuse_what_reverse_cannot(ocp: OCP) -> None:
         UnsupportedProblem: naming the term.
     """
     for c in ocp.at("path"):
-        raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no path '{c.name}'")
+        raise UnsupportedProblem(
+            f"{ocp.name}: reverse integration takes no path constraint ('{c.name}')"
+        )
     if ocp.state_bounds.is_active:
         raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no state bounds")
     if ocp.has_free_time:

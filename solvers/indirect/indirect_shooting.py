@@ -92,7 +92,9 @@ class IndirectShooting(Solver):
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""
         for c in ocp.at("path"):
-            raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no path '{c.name}'")
+            raise UnsupportedProblem(
+                f"{ocp.name}: indirect shooting takes no path constraint ('{c.name}')"
+            )
         if ocp.state_bounds.is_active:
             raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no state bounds")
         if self.continuation:

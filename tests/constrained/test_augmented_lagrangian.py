@@ -186,7 +186,7 @@ def test_runs_with_another_start_and_save(tmp_path) -> None:
 
 def test_what_is_refused() -> None:
     free = point()
-    with pytest.raises(UnsupportedProblem, match="no constraint to relax"):
+    with pytest.raises(UnsupportedProblem, match="no path, state or terminal constraint"):
         AugmentedLagrangian(Schuetz.sound()).build(free)
     with pytest.raises(ProblemError, match="inner"):
         AugmentedLagrangian("ipopt")  # pyright: ignore[reportArgumentType]

@@ -141,6 +141,23 @@ def test_contradiction_names_both_sides():
     assert found.unit == "m/s"
 
 
+def test_the_far_side_of_an_obstacle_is_no_contradiction():
+    """From the start, no direction in which all violations shrink leads round the disc."""
+    assert not list(instants(subject(of.car(guess=None))))
+
+
+def test_an_end_within_the_obstacle_is_one():
+    """(x - 5)^2 + (y - 0.3)^2 = 0.34 at (5.5, 0), and 1 is asked for."""
+
+    def inside(s):
+        clear = (s.x - 5.0) ** 2 + (s.y - 0.3) ** 2
+        return (*of.ends({"x": 5.5, "y": 0.0})(s), Constraint("obstacle", clear, lower=1.0))
+
+    found = only(instants, of.car(guess=None, constraints=inside))
+    assert found.cause is Cause.CONTRADICTION
+    assert {"obstacle", "end x", "end y"} <= set(found.where)
+
+
 def test_control_that_moves_nothing():
     found = only(influence, of.cart(more={"brake": "N"}))
     assert (found.cause, found.where) == (Cause.NO_INFLUENCE, ("brake",))

@@ -200,6 +200,9 @@ def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
+        ({"disturbance": 0.3}, "disturbance = 0.3, a function of t is needed"),
+        ({"parameters": {"reference": [1.0]}}, "plant: parameters = .* a function of t"),
+        ({"saturation": (-1.0, 1.0)}, "plant: saturation is a tuple, Box is needed"),
         ({"disturbance": lambda t: [1.0, 2.0]}, "plant: disturbance has 2 entries"),
         ({"disturbance": lambda t: [np.nan]}, "a finite number is needed"),
         ({"parameters": lambda t: {}}, "no value of reference at t = 0 s"),
@@ -210,6 +213,11 @@ def test_a_function_of_the_plant_that_does_not_fit(plant, message) -> None:
     law = Law(law=lambda x, t: [0.0])
     with pytest.raises(ProblemError, match=message):
         closed_loop(law, replace(mass(), **plant), np.zeros(2), 1.0, dt=DT)
+
+
+def test_a_problem_is_no_plant() -> None:
+    with pytest.raises(ProblemError, match="closed loop: plant is an OCP, Plant is needed"):
+        closed_loop(Law(law=lambda x, t: [0.0]), cart(), START, 1.0, dt=DT)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 PAGE = Path(__file__).parents[2] / "docs" / "mpc.md"
 
 
@@ -14,3 +16,15 @@ def test_the_example_runs(tmp_path, monkeypatch, capsys) -> None:
     assert "replayed to the last bit: True" in said
     assert "'speed' is violated" in said
     assert said.splitlines()[0] == "OPTIMAL   39"
+
+
+@pytest.mark.slow
+def test_the_balloon_keeps_its_limit_by_a_cushion_only(capsys) -> None:
+    section = PAGE.read_text(encoding="utf-8").split("### A limit, a disturbance")[1]
+    code = section.split("```python\n")[1].split("```")[0]
+    exec(compile(code, str(PAGE), "exec"), {"__name__": "example"})
+    hard, soft = capsys.readouterr().out.splitlines()
+    assert "backup" in hard
+    assert float(hard.split("highest ")[1].split()[0]) > 12.0
+    assert "violation 0, 150 optimal>" in soft
+    assert float(soft.split("highest ")[1].split()[0]) < 10.5

@@ -77,14 +77,21 @@ def test_constraint_stacks_its_rows_and_sizes_its_bounds() -> None:
 @pytest.mark.parametrize(
     ("expression", "bounds", "at", "message"),
     [
-        (ca.SX.sym("x"), (0.0, 1.0), "somewhere", "constraint 'c': at = 'somewhere'"),
-        (ca.MX.sym("x"), (0.0, 1.0), "path", "constraint 'c' is a MX"),
+        (
+            ca.SX.sym("x"),
+            (0.0, 1.0),
+            "somewhere",
+            "at = 'somewhere' is no place; 'path', 'initial' and",
+        ),
+        (ca.MX.sym("x"), (0.0, 1.0), "path", "constraint 'c' is an MX"),
         (ca.SX.sym("x", 2, 2), (0.0, 1.0), "path", r"constraint 'c' has shape \(2, 2\)"),
         (ca.SX.sym("x"), (1.0, 0.0), "path", r"constraint 'c'\[0\]: no number"),
         (ca.SX.sym("x"), ([0.0, 0.0], 1.0), "path", "constraint 'c': lower has 2"),
         (ca.SX.sym("x"), (np.nan, 1.0), "path", "constraint 'c': lower"),
         (ca.SX.sym("x"), (0.0, np.nan), "path", "constraint 'c': upper"),
         ("x > 0", (0.0, 1.0), "path", "constraint 'c' is a str"),
+        (ca.SX.sym("x") <= 1.0, (0.0, 1.0), "path", r"'c': \(x<=1\) is true or false"),
+        ([ca.SX.sym("x"), ca.SX.sym("y") == 0.0], (0.0, 1.0), "path", r"\(y==0\) is true or"),
     ],
 )
 def test_constraint_refuses(expression: object, bounds: tuple, at: str, message: str) -> None:

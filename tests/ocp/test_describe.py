@@ -55,6 +55,16 @@ def test_bounds_constraints_and_invariants() -> None:
     assert "x(0) = (0, 0)   (guess)" in text
 
 
+def test_a_number_that_occurs_twice_is_no_reason_to_hide_an_expression() -> None:
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    f = u + 2 * (1 - (x / 50 - 1) ** 2)
+    assert "@1=1" in str(f)
+    model = Model(name="river", x=x, u=u, f=f)
+    text = OCP(name="river", model=model, x0=[0.0], horizon=1.0, running_cost=u**2).describe()
+    assert "river   (river: 1 state, 1 control)" in text
+    assert "d(x)/dt = (u+(2.*(1-sq(((x/50)-1)))))" in text
+
+
 def test_terminal_equations() -> None:
     text = energy().describe()
     assert "x_0 = 1   (end, terminal)" in text

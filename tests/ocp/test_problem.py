@@ -69,12 +69,12 @@ Y, MX = ca.SX.sym("y"), ca.MX.sym("m")
         ({"x0": np.inf}, ("x0[0] is inf",)),
         ({"x0": "here"}, ("x0 is not numeric", "here")),
         ({"running_cost": Y}, ("running_cost contains y",)),
-        ({"running_cost": MX}, ("running_cost is a MX",)),
+        ({"running_cost": MX}, ("running_cost is an MX",)),
         ({"running_cost": ca.vertcat(x, u)}, ("running_cost has 2 elements",)),
         ({"running_cost": np.nan}, ("running_cost (row 0) is not finite",)),
         ({"running_cost": 1.0 / x}, ("running_cost", "not finite", "singular start")),
         ({"terminal_cost": u**2}, ("terminal_cost contains u", "no controls")),
-        ({"terminal_cost": MX}, ("terminal_cost is a MX",)),
+        ({"terminal_cost": MX}, ("terminal_cost is an MX",)),
         ({"terminal_cost": ca.log(x - 1.0)}, ("terminal_cost (row 0) is not finite",)),
         ({"control_bounds": Box([0.0, 0.0], 1.0)}, ("control_bounds: lower has 2 entries, 1",)),
         ({"control_bounds": Box(1.0, 0.0)}, ("control_bounds[0]", "between 1.0 and 0.0")),
@@ -134,7 +134,11 @@ def test_refuses_foreign_symbols_in_the_dynamics() -> None:
 
 @pytest.mark.parametrize(
     ("horizon", "words"),
-    [(2.5, "horizon = 2.5 .* number of steps"), (FREE, "discrete-time model has no free final")],
+    [
+        (2.5, "horizon = 2.5 .* number of steps"),
+        (2.0, "horizon = 2.0 .* no duration"),
+        (FREE, "discrete-time model has no free final"),
+    ],
 )
 def test_refuses_the_wrong_horizon_of_a_discrete_model(horizon: object, words: str) -> None:
     with pytest.raises(ProblemError, match=words):

@@ -220,7 +220,7 @@ def test_continuation_gives_up() -> None:
     [
         (
             lambda: point(constraints=lambda x, u: (Constraint("wall", x, upper=1.0),)),
-            "path 'wall'",
+            "no path constraint \\('wall'\\)",
         ),
         (bryson_denham, "state bounds"),
         (double_integrator_minimum_time, "linear in the control acceleration"),

@@ -129,7 +129,7 @@ def test_a_bad_accuracy(accuracy: Any) -> None:
 
 def test_what_is_no_solution_is_refused_by_name() -> None:
     ocp: Any = case_called("van-der-pol").build()
-    with pytest.raises(ProblemError, match="polish: solution is a OCP, Solution is needed"):
+    with pytest.raises(ProblemError, match="polish: solution is an OCP, Solution is needed"):
         polish(ocp)
     with pytest.raises(ProblemError, match="polish: solver is a MultipleShooting"):
         polish(solve(ocp, MultipleShooting(20)), solver=cast("Any", MultipleShooting()))

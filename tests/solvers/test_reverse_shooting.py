@@ -181,7 +181,7 @@ def test_refuses_what_it_cannot_treat() -> None:
         (4, changed(given, invariants=(Constraint("lie", x[0], 0.0, 0.0),)), "do not keep 'lie'"),
         (4, changed(given, state_bounds=Box(-3.0, 3.0)), "state bounds"),
         (4, changed(given, horizon=FreeTime(1.0)), "fixed final time"),
-        (4, bare(velocity_bounds=Box(-1.0, 1.0)), "no path 'joint velocity'"),
+        (4, bare(velocity_bounds=Box(-1.0, 1.0)), "no path constraint .'joint velocity'"),
         (
             4,
             changed(given, constraints=(Constraint("up", x[0], 0.0, 0.0, at="terminal"),)),
