@@ -33,6 +33,20 @@ class Buffered:
         buffers.evaluate()
         return tuple([place.get() for place in buffers.outputs])
 
+    @property
+    def inputs(self) -> list[np.ndarray]:
+        """The memory of each input: its nonzeros, column by column."""
+        return [place.values for place in self._buffers.inputs]
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """The memory of each output: its nonzeros, column by column."""
+        return [place.values for place in self._buffers.outputs]
+
+    def evaluate(self) -> None:
+        """Compute the outputs from the inputs, in that memory."""
+        self._buffers.evaluate()
+
     @cached_property
     def _buffers(self) -> "_Buffers":
         return _Buffers(self.function)

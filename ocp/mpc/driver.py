@@ -220,7 +220,7 @@ class MPC:
             input=choice.input,
             outcome=choice.outcome,
             plan=followed,
-            age=round((moment.at - followed.t[0]) / self.dt) if followed else 0,
+            age=round((moment.at - followed.t[0]) / self.dt) if followed and not new else 0,
             clipped=choice.clipped,
         )
 
@@ -276,6 +276,7 @@ class MPC:
             is_measured=is_measured,
             plan=plan,
             values=values,
+            parameters=values.as_dict(),
             since=since,
             is_informed=not why,
             starts_afresh=self.memory.starts_afresh,
@@ -315,7 +316,7 @@ def _account(
         "message": "; ".join(moment.reasons),
         "residual": plan.residual if plan else np.inf,
         "late": late,
-        "parameters": moment.values.as_dict() if moment.is_informed else {},
+        "parameters": moment.parameters if moment.is_informed else {},
         "is_informed": moment.is_informed,
         "time_used": used,
     }

@@ -1,9 +1,9 @@
 """From a measurement to an input that somebody answers for: the rungs, best first."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +38,9 @@ _ROUNDING = 1e-6
 _NO_PARAMETERS = np.empty(0)
 
 
-class Moment(NamedTuple):
-    """What a decision is made from.
+@dataclass(slots=True, eq=False)
+class Moment:
+    """What a decision is made from; not frozen, which would take twice as long to make.
 
     Attributes:
         t: when the state was measured [s].
@@ -49,6 +50,7 @@ class Moment(NamedTuple):
             there is one.
         plan: the last good one.
         values: parameters and signals of a horizon.
+        parameters: the same by name.
         since: where that horizon begins [s]: at ``at``, or where the last plan began.
         is_informed: False where nobody could say the parameters of the horizon from ``at`` on,
             and those of the last plan stand in as far as they reach.
@@ -62,6 +64,7 @@ class Moment(NamedTuple):
     is_measured: bool
     plan: Solution | None
     values: ParameterValues
+    parameters: Mapping[str, np.ndarray]
     since: float
     is_informed: bool
     starts_afresh: bool
@@ -73,8 +76,9 @@ class Moment(NamedTuple):
         return self.is_measured and self.is_informed
 
 
-class Choice(NamedTuple):
-    """An input that a rung answers for.
+@dataclass(slots=True, eq=False)
+class Choice:
+    """An input that a rung answers for; not frozen, as a ``Moment``.
 
     Attributes:
         outcome: which rung.
@@ -125,7 +129,7 @@ class Ladder:
             plan = self.program.run(
                 x0=moment.start,
                 t0=moment.at,
-                parameters=moment.values.as_dict(),
+                parameters=moment.parameters,
                 guess=Shifted(last, moment.at) if last else self.guess,
             )
         except INSIDE as error:
@@ -236,10 +240,13 @@ class Ladder:
         self, moment: Moment, given: np.ndarray, outcome: Outcome, plan: Solution | None = None
     ) -> Choice | None:
         """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
+        # Nearly all inputs need no clipping, and plain numbers say so sooner than numpy does.
+        each = zip(given.tolist(), *self._limits, strict=True)
+        if all([low <= value <= high for value, low, high in each]):
+            return Choice(outcome, given.copy(), 0.0, plan)
         inside = self.box.clip(given)
-        moved = given - inside
-        # Where an input is not finite, nor is this: what is no number is not zero, either.
-        excess = float(np.abs(moved).max()) if np.count_nonzero(moved) else 0.0
+        # Where an input is not finite, nor is this.
+        excess = float(np.abs(given - inside).max())
         if not isfinite(excess):
             moment.reasons.append(f"the input {given} is not finite")
             return None
@@ -269,6 +276,15 @@ class Ladder:
         """Whether there is anything along the way that a plan could violate."""
         ocp = self.ocp
         return bool(ocp.at("path")) or ocp.state_bounds.is_active or ocp.control_bounds.is_active
+
+    @cached_property
+    def _limits(self) -> tuple[list[float], list[float]]:
+        """The bounds of the input as plain numbers, finite where there are none: inf is outside."""
+        largest = np.finfo(float).max
+        lower, upper = (
+            np.clip(side, -largest, largest) for side in (self.box.lower, self.box.upper)
+        )
+        return lower.tolist(), upper.tolist()
 
     @cached_property
     def _sending(self) -> Sending:

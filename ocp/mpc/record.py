@@ -30,10 +30,6 @@ _KINDS: tuple[ControlKind | None, ...] = (
     "polynomial",
     "extremal",
 )
-_OUTCOME, _STATUS, _KIND = (
-    {entry: place for place, entry in enumerate(entries)}
-    for entries in (_OUTCOMES, _STATUSES, _KINDS)
-)
 
 
 class Plan(NamedTuple):
@@ -116,29 +112,31 @@ def packed(measured: np.ndarray, step: Attempt, plan: Solution | None) -> bytes:
     if plan:
         arrays += (plan.t, plan.x, plan.x0, plan.costate, plan.u, plan.breaks)
     arrays += step.parameters.values()
-    arrays = [np.asarray(array, dtype=float) for array in arrays]
+    # Contiguous, so that their bytes can be joined from where they are.
+    arrays = [np.asarray(array, dtype=float, order="C") for array in arrays]
     sizes = []
     for array in arrays:
         sizes += array.shape if array.ndim == 2 else (len(array), _VECTOR)
     # As many as len(arrays) times _SHAPE, at once.
     shapes = pack(f"<{len(sizes)}i", *sizes)
-    body = b"".join([shapes, *[array.tobytes() for array in arrays], step.message.encode()])
+    message = step.message.encode()
     head = _HEAD.pack(
-        len(body),
+        len(shapes) + sum([array.nbytes for array in arrays]) + len(message),
         step.t,
         step.residual,
         decision.clipped if decision else 0.0,
         step.time_used,
         decision.age if decision else 0,
-        _OUTCOME[decision.outcome if decision else None],
-        _STATUS[step.status],
+        _OUTCOMES.index(decision.outcome if decision else None),
+        _STATUSES.index(step.status),
         step.late,
         step.is_informed,
-        _KIND[plan.control_kind if plan else None],
-        _STATUS[plan.status if plan else None],
+        _KINDS.index(plan.control_kind if plan else None),
+        _STATUSES.index(plan.status if plan else None),
         len(arrays),
     )
-    return head + body
+    # Before Python 3.12 a type checker does not know that arrays are buffers.
+    return b"".join([head, shapes, *arrays, message])  # pyright: ignore[reportArgumentType]
 
 
 def read_header(file: BinaryIO, path: str | Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +15,7 @@ from ocp import (
     Box,
     Constraint,
     ControlRefused,
+    Model,
     Outcome,
     Plant,
     ProblemError,
@@ -136,6 +138,27 @@ def test_a_small_excess_is_clipped_and_recorded() -> None:
     assert rollout.outcomes[3] is Outcome.OPTIMAL
     assert rollout.inputs[3] == LIMIT
     assert rollout.clipped[3] == pytest.approx(1e-7)
+
+
+def test_an_input_without_bounds_must_still_be_finite() -> None:
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    model = Model(name="steep", x=x, u=u, f=ca.exp(u) - 1.0)
+    ocp = OCP(name="steep", model=model, x0=[1.0], horizon=1.0, running_cost=x**2 + u**2)
+    solver = scripted({0.0: lambda solution: solution.with_(u=np.full_like(solution.u, 1e3))})
+    mpc = MPC(ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"), backup=None)
+    with (
+        np.errstate(invalid="ignore"),
+        pytest.raises(ControlRefused, match=r"the input \[inf\] is not finite"),
+    ):
+        mpc.step([1.0], 0.0)
+
+
+def test_who_changes_an_input_changes_no_plan() -> None:
+    decision = controller().step([1.0, 0.0], 0.0)
+    assert decision.plan is not None
+    first = decision.plan.u[0].copy()
+    decision.input[:] = 0.123
+    np.testing.assert_array_equal(decision.plan.u[0], first)
 
 
 def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:

@@ -1,3 +1,4 @@
+import gc
 import os
 import subprocess
 import sys
@@ -233,6 +234,19 @@ def test_a_buffered_function_is_the_function(n, columns, seed):
     empty = np.empty((0, columns))
     for one, other in zip(Buffered(function)(given, empty), function(given, empty), strict=True):
         np.testing.assert_array_equal(one, np.array(other).reshape(one.shape))
+
+
+def test_a_buffered_function_is_evaluated_in_its_own_memory():
+    """Also when nobody keeps anything but the method and the memory."""
+    buffered = Buffered(pendulum())
+    (x, u, t), (found, *_) = buffered.inputs, buffered.outputs
+    evaluate = buffered.evaluate
+    del buffered
+    gc.collect()
+    x[:], u[:], t[:] = [1.0, 2.0], 0.5, 0.0
+    evaluate()
+    after, _ = pendulum()([1.0, 2.0], 0.5, 0.0)
+    np.testing.assert_array_equal(found, np.array(after).ravel())
 
 
 def test_what_a_buffered_function_returned_stays_as_it_was():
