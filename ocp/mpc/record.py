@@ -13,7 +13,7 @@ from ocp.mpc.decision import Attempt, Decision, Outcome
 from ocp.solution import ControlKind, Solution
 from ocp.status import Status
 
-_FORMAT = "flight record, version 2"
+_FORMAT = "flight record, version 3"  # the enums below belong to it
 # Bytes that follow; t, residual, clipped, time used; age; outcome, status, late, informed,
 # kind and status of the plan, number of arrays.
 _HEAD = Struct("<I4di7B")
