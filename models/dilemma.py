@@ -4,11 +4,10 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from models._numbers import at_least
 from models.distance_cost import DistanceCost
 from models.obstacles import link_distances
 from models.scenarios import ArmScenario
-from ocp import OCP, Parameter
+from ocp import OCP, Parameter, positive
 
 WEIGHT = "weight"
 
@@ -35,8 +34,8 @@ class BarrierCost:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        at_least(self.gain, 0.0, "barrier cost: gain", strictly=True)
-        at_least(self.influence, 0.0, "barrier cost: influence", strictly=True)
+        positive(self.gain, "barrier cost: gain")
+        positive(self.influence, "barrier cost: influence")
 
     def at_distance(self, distance: ca.SX, radius: float) -> ca.SX:
         """Return p0 element by element; ``inf`` within the radius.

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
-from ocp import Model, ProblemError
+from models._numbers import vector
+from ocp import Model, ProblemError, positive
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,7 +79,7 @@ class LinearPlant:
 
     def sampled(self, dt: float) -> "LinearPlant":
         """Return the discrete-time plant under a zero-order hold of dt [s], through scipy."""
-        at_least(dt, 0.0, f"{self.name}: dt", strictly=True)
+        positive(dt, f"{self.name}: dt")
         if self.dt is not None:
             raise ProblemError(f"{self.name}: sampled already, every {self.dt:g} s")
         from scipy import signal  # as above
@@ -143,7 +143,7 @@ def mass_spring_damper(
         damping: c [Ns/m].
         mass: m [kg], positive.
     """
-    m = at_least(mass, 0.0, "mass-spring-damper: mass", strictly=True)
+    m = positive(mass, "mass-spring-damper: mass")
     return LinearPlant(
         name="mass-spring-damper",
         A=np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]),

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
+from models._numbers import vector
 from models.linear import LinearPlant, mass_spring_damper, matrix
-from ocp import OCP, Box, ProblemError, Signal
+from ocp import OCP, Box, ProblemError, Signal, positive
 
 # More asymmetry of a weight than this, relative to its largest entry, is no slip of rounding.
 _SYMMETRIC = 1e-12
@@ -94,7 +94,7 @@ def sinusoid(
         period: [s].
         moving: False: the velocity of the reference is zero throughout.
     """
-    rate = 2.0 * np.pi / at_least(period, 0.0, "sinusoid: period", strictly=True)
+    rate = 2.0 * np.pi / positive(period, "sinusoid: period")
     phase = rate * np.asarray(t, dtype=float)
     velocity = amplitude * rate * np.cos(phase) * float(moving)
     return np.stack([amplitude * np.sin(phase), velocity], axis=1)

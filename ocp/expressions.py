@@ -88,19 +88,38 @@ def whole(value: object, what: str, *, least: int = 1) -> int:
     return int(value)
 
 
-def positive(value: object, what: str, *, finite: bool = True) -> float:
+def positive(value: object, what: str, *, finite: bool = True, below: float = np.inf) -> float:
     """Return ``value`` if it is one positive number, or raise ``ProblemError``.
 
     Args:
         value: what should be a number.
         what: how a message calls it.
         finite: whether infinity is refused.
+        below: limit that a finite number must not reach.
     """
-    number = isinstance(value, int | float | np.integer | np.floating)
-    as_float = float(value) if number and not isinstance(value, bool) else np.nan
-    if not (as_float > 0.0 and (as_float < np.inf or not finite)):
-        raise ProblemError(f"{what} = {value!r}, it must be positive{', finite' * finite}")
-    return as_float
+    number = _number(value, finite, below)
+    if not number > 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be positive{_limit(finite, below)}")
+    return number
+
+
+def not_negative(value: object, what: str, *, finite: bool = True, below: float = np.inf) -> float:
+    """Return ``value`` if it is one number, 0 or more; else as ``positive``."""
+    number = _number(value, finite, below)
+    if not number >= 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be 0 or more{_limit(finite, below)}")
+    return number
+
+
+def _number(value: object, finite: bool, below: float) -> float:
+    """Return one number below a limit as it is, anything else as NaN."""
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    number = float(value) if is_number and not isinstance(value, bool) else np.nan
+    return number if number < below or (number == np.inf and not finite) else np.nan
+
+
+def _limit(finite: bool, below: float) -> str:
+    return f", below {below:g}" if below < np.inf else ", finite" * finite
 
 
 def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:

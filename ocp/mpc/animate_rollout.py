@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ocp.errors import ProblemError
-from ocp.expressions import whole
+from ocp.expressions import positive, whole
 from ocp.mpc.decision import Decision
 from ocp.mpc.plot_rollout import COLOURS, labels, refuse_empty
 from ocp.mpc.rollout import Draw, Progress, Rollout
@@ -67,8 +67,7 @@ def _times(rollout: Rollout, frames_per_second: int, speed: float) -> np.ndarray
         raise ProblemError(
             f"animation: {frames_per_second} frames per second, a GIF shows 1 to {_FASTEST}"
         )
-    if not 0.0 < speed < np.inf:
-        raise ProblemError(f"animation: speed = {speed}, it must be positive, finite")
+    positive(speed, "animation: speed")
     first, last = rollout.t[0], rollout.t[-1]
     count = max(2, round((last - first) / speed * frames_per_second) + 1)
     if count > _MOST:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import numbers
+from ocp.expressions import numbers, positive
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import stationary
 from ocp.linear.structure import linear_quadratic
@@ -117,8 +117,7 @@ def instantaneous(
         ProblemError: if the reach is not positive, or ``sent`` is neither.
         UnsupportedProblem: what the minimum principle refuses, see ``derive``.
     """
-    if not reach > 0.0:
-        raise ProblemError(f"instantaneous control: reach = {reach} s, it must be positive")
+    positive(reach, "instantaneous control: reach [s]")
     if sent not in ("control", "rate"):
         raise ProblemError(f"instantaneous control: sent = {sent!r} is neither control nor rate")
     m, control = ocp.model, derive(ocp).control

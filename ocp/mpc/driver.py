@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance, numbers, positive
+from ocp.expressions import instance, not_negative, numbers, positive
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
@@ -132,8 +132,7 @@ class MPC:
             )
         if self.budget is not None:
             positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
-        if not self.tolerance >= 0.0:
-            raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
+        not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
 
     @property
     def _fastest(self) -> Solver:

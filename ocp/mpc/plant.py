@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError
-from ocp.expressions import instance, numbers, whole
+from ocp.expressions import instance, not_negative, numbers, whole
 from ocp.mpc.rehearsal import Rehearsal
 from ocp.problem import OCP
 
@@ -55,10 +55,8 @@ class Plant:
         for name in ("process_noise", "measurement_noise"):
             object.__setattr__(self, name, numbers(getattr(self, name), nx, f"plant: {name}"))
         object.__setattr__(self, "saturation", self.saturation.sized(nu, "plant: saturation"))
-        if not 0.0 <= self.lag < np.inf:
-            raise ProblemError(f"plant: lag = {self.lag} s, it must not be negative")
-        if not 0.0 <= self.jitter < 1.0:
-            raise ProblemError(f"plant: jitter = {self.jitter}, it is a share in [0, 1)")
+        not_negative(self.lag, "plant: lag [s]")
+        not_negative(self.jitter, "plant: jitter", below=1.0)
 
     def started(self, x0: ArrayLike, seed: int = 0) -> "RunningPlant":
         """Return the plant at rest in a state (nx,) at t = 0."""

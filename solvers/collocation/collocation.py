@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     Data,
-    ProblemError,
     Program,
     Solution,
     Solver,
@@ -19,6 +18,7 @@ from ocp import (
     UnsupportedProblem,
     elevated,
     instance,
+    positive,
 )
 from solvers.collocation.costates import costates
 from solvers.collocation.gaps import Gaps
@@ -76,8 +76,7 @@ class Collocation(Solver):
         if self.mesh is not None:
             instance(self.mesh, Mesh, "collocation: mesh")
         self.chosen_mesh  # noqa: B018 - checks its own
-        if not self.accuracy > 0.0:
-            raise ProblemError(f"the accuracy must be positive, not {self.accuracy}")
+        positive(self.accuracy, "collocation: accuracy", finite=False)
         self.options  # noqa: B018 - checks its own
 
     @property

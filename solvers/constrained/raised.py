@@ -15,6 +15,7 @@ from ocp import (
     Work,
     evaluate,
     instance,
+    positive,
     whole,
 )
 
@@ -62,10 +63,10 @@ def raise_until_clear(
     price = _first_price(soft, parameter)
     if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
         raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
-    if not (tolerance > 0.0 and (price > 0.0).all()):
+    positive(tolerance, "raise until clear: tolerance")
+    if not (price > 0.0).all():
         raise ProblemError(
-            f"raise until clear: tolerance = {tolerance} and '{parameter}' = {price} must be "
-            "positive, or nothing can be raised until anything is clear"
+            f"raise until clear: '{parameter}' = {price}, it must be positive to be raised"
         )
     program = solver.build(soft)
     runs: list[Solution] = []

@@ -17,6 +17,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     evaluate,
+    positive,
     whole,
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot
@@ -109,8 +110,7 @@ def enumerate_extremals(
     whole(points, "enumerate_extremals: points")
     if keep is not None:
         whole(keep, "enumerate_extremals: keep")
-    if not 0.0 < gap < np.inf:
-        raise ProblemError(f"enumerate_extremals: gap = {gap}, it must be positive, finite")
+    positive(gap, "enumerate_extremals: gap")
     _refuse(ocp)
     kept = Kept.of(ocp)
     redundant_by_one(kept)

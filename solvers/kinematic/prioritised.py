@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, instance
+from ocp import ProblemError, instance, positive
 from solvers.kinematic.program import KinematicProgram, refuse_dependent
 from solvers.kinematic.pseudo_inverse import Filtered, Inverse
 from solvers.kinematic.task import Task
@@ -62,8 +62,7 @@ class PrioritisedKinematics:
         for i, inverse in enumerate(self.inverses):
             instance(inverse, Inverse, f"kinematics: damping[{i}]")
         for name in ("speed_limit", "tolerance"):
-            if not getattr(self, name) > 0.0:
-                raise ProblemError(f"kinematics: {name} = {getattr(self, name)}, it must be > 0")
+            positive(getattr(self, name), f"kinematics: {name}", finite=False)
         _refuse_used_up(tasks)
         object.__setattr__(self, "tasks", tasks)
 

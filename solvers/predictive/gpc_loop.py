@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError, Status
+from ocp import ProblemError, Status, whole
 from solvers.predictive.carima_prediction import history
 from solvers.predictive.gpc import GPCLaw
 
@@ -75,8 +75,7 @@ def gpc_loop(
     Raises:
         ProblemError: if the reference, the noise or the load is too short.
     """
-    if steps != int(steps) or steps < 1:
-        raise ProblemError(f"GPC loop: steps = {steps!r}, a whole number >= 1 is needed")
+    whole(steps, "GPC loop: steps")
     n2 = law.prediction.n2
     w = history(reference, "reference")
     w = np.full(steps + n2, w[0]) if w.size == 1 else w

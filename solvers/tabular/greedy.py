@@ -14,7 +14,6 @@ from ocp import (
     RK4,
     Data,
     Integrator,
-    ProblemError,
     Program,
     Solution,
     Solver,
@@ -72,9 +71,7 @@ class Greedy(Solver):
         """Check the options."""
         whole(self.intervals, "Greedy: intervals")
         whole(self.max_iterations, "Greedy: max_iterations")
-        positive(self.tolerance, "Greedy: tolerance")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ProblemError(f"Greedy: tolerance = {self.tolerance}, it must be in (0, 1)")
+        positive(self.tolerance, "Greedy: tolerance", below=1.0)
 
     def build(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ocp import ProblemError
+from ocp import ProblemError, whole
 
 # A point outside the grid by less than this part of a cell is on its edge.
 _ROUNDING = 1e-9
@@ -36,8 +36,7 @@ class Axis:
             raise ProblemError(
                 f"axis: finite lower < upper is needed, not {self.lower}, {self.upper}"
             )
-        if self.points != int(self.points) or self.points < 3:
-            raise ProblemError(f"axis: points = {self.points!r}, a whole number >= 3 is needed")
+        whole(self.points, "axis: points", least=3)
 
     @property
     def values(self) -> np.ndarray:
