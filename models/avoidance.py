@@ -27,6 +27,7 @@ def clearance_constraint(
         obstacles: from whose cores the links keep away.
         clearance: one distance for all, or one for each obstacle [m].
     """
+    instance(arm, PlanarArm, "clearance: arm")
     least = np.broadcast_to(np.asarray(clearance, dtype=float).reshape(-1), len(obstacles))
     distances = [link_distances(arm, theta, obstacle) for obstacle in obstacles]
     return Constraint("clearance", ca.vertcat(*distances), lower=np.repeat(least, arm.n))

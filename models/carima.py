@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import ProblemError, whole
+from ocp import ProblemError, instance, real, whole
 
 # Roots of C closer to the unit circle than this: its filter forgets too slowly to be of use.
 _STABLE = 1.0 - 1e-9
@@ -95,6 +95,8 @@ class CarimaPlant:
 
     def __init__(self, model: Carima, start: float = 0.0) -> None:
         """Rest at ``start`` with input 0 (counted from the input that keeps it there)."""
+        instance(model, Carima, "carima plant: model")
+        real(start, "carima plant: start")
         self.model = model
         self._a = np.convolve(model.a, [1.0, -1.0])
         self._y = [start] * len(self._a)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.carima import Carima
-from ocp import OCP, Box, Constraint, Model, ProblemError, Signal, not_negative, whole
+from ocp import OCP, Box, Constraint, Model, ProblemError, Signal, instance, not_negative, whole
 
 
 def carima_ocp(
@@ -52,6 +52,7 @@ def carima_ocp(
     Raises:
         ProblemError: naming what is wrong.
     """
+    instance(model, Carima, "carima: model")
     w = vector(reference, np.size(reference), "carima: reference")
     n = len(w) - 1 if steps is None else whole(steps, "carima: steps")
     w = np.full(n + 1, w[0]) if w.size == 1 else w

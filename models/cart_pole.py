@@ -7,7 +7,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, not_negative, positive
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    Guess,
+    Model,
+    ProblemError,
+    instance,
+    not_negative,
+    positive,
+    real,
+)
 
 # Weights of position, angle, velocity and angular velocity, and of the force.
 _STAGE, _END, _FORCE = (1.0, 1.0, 0.1, 0.1), (100.0, 100.0, 10.0, 10.0), 0.01
@@ -124,8 +135,8 @@ def cart_pole_swing_up(
     Raises:
         ProblemError: if a bound is negative, or the end lies beyond the track.
     """
-    model = (system or CartPole()).model()
-    end = [float(distance), np.pi, 0.0, 0.0]
+    model, goal = _model(system), real(distance, "cart-pole: distance")
+    end = [goal, np.pi, 0.0, 0.0]
     return OCP(
         name="cart-pole swing-up",
         model=model,
@@ -181,8 +192,8 @@ def cart_pole_upright(
         ProblemError: if a bound or weight is negative, or the target lies beyond the track or
             in its cushion.
     """
-    model = (system or CartPole()).model()
-    off = model.x - ca.DM([distance, np.pi, 0.0, 0.0])
+    model, goal = _model(system), real(distance, "cart-pole: distance")
+    off = model.x - ca.DM([goal, np.pi, 0.0, 0.0])
     q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
     r = positive(effort, "cart-pole: effort")
     soft, on_track = not_negative(cushion, "cart-pole: cushion"), _on(track, distance)
@@ -203,6 +214,12 @@ def cart_pole_upright(
         state_bounds=Box() if soft else on_track,
         smoothness=1 if soft else 2,
     )
+
+
+def _model(system: CartPole | None) -> Model:
+    if system is not None:
+        instance(system, CartPole, "cart-pole: system")
+    return (system or CartPole()).model()
 
 
 def _within(force: float, what: str) -> Box:

@@ -7,7 +7,7 @@ import casadi as ca
 from models.distance_cost import DistanceCost
 from models.obstacles import link_distances
 from models.scenarios import ArmScenario
-from ocp import OCP, Parameter, positive
+from ocp import OCP, Parameter, instance, positive
 
 WEIGHT = "weight"
 
@@ -56,6 +56,7 @@ def bounded_ocp(scenario: ArmScenario, *, weight: float = 1.0) -> OCP:
         scenario: the arm and its disc.
         weight: k unless a run says otherwise.
     """
+    instance(scenario, ArmScenario, "bounded_ocp: scenario")
     bare, k = scenario.ocp(weight=0.0), ca.SX.sym("k")
     cost = DistanceCost(scenario.gain, scenario.influence)
     return replace(
@@ -74,6 +75,7 @@ def unbounded_ocp(scenario: ArmScenario, *, gain: float = 1e-3) -> OCP:
         scenario: the arm and its disc.
         gain: s of the barrier [m²].
     """
+    instance(scenario, ArmScenario, "unbounded_ocp: scenario")
     bare = scenario.ocp(weight=0.0)
     cost = BarrierCost(gain, scenario.influence)
     distances = link_distances(scenario.arm, bare.model.x, scenario.disc)

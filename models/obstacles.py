@@ -12,7 +12,7 @@ from models._convex import counter_clockwise
 from models._numbers import vector
 from models.arm import PlanarArm
 from models.distances import signed_distance
-from ocp import ProblemError, not_negative, positive
+from ocp import ProblemError, instance, not_negative, positive
 
 Point = ca.SX | ArrayLike
 # Directions in which the outline of an obstacle is drawn.
@@ -191,6 +191,8 @@ def link_distances(arm: PlanarArm, theta: ca.SX | ArrayLike, obstacle: Obstacle)
 
     The arm is clear of the obstacle where all are at least its radius.
     """
+    instance(arm, PlanarArm, "link distances: arm")
+    instance(obstacle, Obstacle, "link distances: obstacle")
     joints, core = arm.joints(theta), obstacle.core
     links = [(joints[:, i], joints[:, i + 1]) for i in range(arm.n)]
     return ca.vertcat(*[signed_distance(core, a, b) for a, b in links])

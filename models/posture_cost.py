@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.arm import PlanarArm
-from ocp import ProblemError, not_negative, positive
+from ocp import ProblemError, instance, not_negative, positive
 
 
 class PostureCost(ABC):
@@ -113,6 +113,7 @@ def squared_manipulability(arm: PlanarArm, theta: ca.SX) -> ca.SX:
         arm: the arm, n links.
         theta: configuration (n,) [rad].
     """
+    instance(arm, PlanarArm, "squared manipulability: arm")
     jacobian = arm.jacobian(theta)
     first, second = jacobian[0, :], jacobian[1, :]
     return ca.sumsqr(first) * ca.sumsqr(second) - ca.dot(first, second) ** 2

@@ -115,6 +115,7 @@ def redundancy_ocp(
             obstacle on the base, a start inside an obstacle.
     """
     t = ca.SX.sym("t") if t is None else t
+    instance(arm, PlanarArm, f"{name}: arm")
     start = vector(theta0, arm.n, f"{name}: theta0")
     duration = positive(horizon, f"{name}: horizon")
     k = not_negative(weight, f"{name}: weight")

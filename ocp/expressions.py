@@ -111,6 +111,14 @@ def not_negative(value: object, what: str, *, finite: bool = True, below: float 
     return number
 
 
+def real(value: object, what: str) -> float:
+    """Return ``value`` if it is one finite number; else as ``positive``."""
+    number = _number(value, True, np.inf)
+    if not number > -np.inf:
+        raise ProblemError(f"{what} = {value!r}, a finite number is needed")
+    return number
+
+
 def _number(value: object, finite: bool, below: float) -> float:
     """Return one number below a limit as it is, anything else as NaN."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
@@ -133,21 +141,28 @@ def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
     Raises:
         ProblemError: otherwise, naming ``what``, its class and those allowed.
     """
-    if not isinstance(value, kind):
+    # A class has what its instances have: to a protocol it looks like one of them.
+    if isinstance(value, type) or not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(k.__name__ for k in kinds)
-        raise ProblemError(f"{what} is {_named(value)}, {names} is needed{_hint(value, kind)}")
+        raise ProblemError(f"{what} is {_named(value)}, {names} is needed{_hint(value, kinds)}")
+
+
+def function(value: object, what: str) -> None:
+    """Check that ``value`` can be called, or raise ``ProblemError`` as ``instance`` does."""
+    if isinstance(value, type) or not callable(value):
+        raise ProblemError(f"{what} is {_named(value)}, a function is needed")
 
 
 def _named(value: object) -> str:
     return f"the class {value.__name__}" if isinstance(value, type) else f"a {type(value).__name__}"
 
 
-def _hint(value: object, kind: type | tuple[type, ...]) -> str:
+def _hint(value: object, kinds: tuple[type, ...]) -> str:
     """Return what was probably meant: an instance of a class, the solution inside a result."""
     if isinstance(value, type):
-        return f": write {value.__name__}(...)" if issubclass(value, kind) else ""
-    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kind) else ""
+        return f": write {value.__name__}(...)" if {*kinds} & {*value.__mro__} else ""
+    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kinds) else ""
 
 
 def numbers(

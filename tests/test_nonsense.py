@@ -13,41 +13,81 @@ import pytest
 
 from models import (
     Carima,
+    CarimaPlant,
     CartPole,
     Disc,
+    bounded_ocp,
+    carima_ocp,
     cart_pole_swing_up,
+    cart_pole_upright,
+    clearance_constraint,
     discrete_double_integrator,
     goddard,
+    line,
+    link_distances,
+    lq_regulator,
+    mass_spring_damper,
+    obstacles_from_data,
+    path_position,
     random_scenarios,
+    redundancy_ocp,
+    sinusoid,
+    squared_manipulability,
+    stable_plant,
+    state_space,
+    step_reference,
+    thesis_regulator,
+    thesis_tracking,
+    tracking_ocp,
+    unbounded_ocp,
     van_der_pol,
 )
 from ocp import (
     MPC,
     OCP,
+    RK4,
+    Applied,
     Box,
     Constraint,
+    FlightRecorder,
     FreeTime,
     Guess,
+    Law,
     Model,
     Plant,
     ProblemError,
+    Rollout,
     Solution,
     Status,
     Transcription,
+    assembled,
+    c_code,
+    closed_loop,
+    compiled,
     costates_along,
+    curvature,
     derive,
     discretise,
     evaluate,
     hamiltonian,
     instantaneous,
     linear_quadratic,
+    records,
+    replay,
+    saturated_lqr,
     solve,
+    start_fault,
+    stationary,
+    symbol_kind,
+    with_input_rate,
+    with_stationary_end,
 )
 from solvers import (
     GPC,
     Armijo,
     AugmentedLagrangian,
     Axis,
+    Batch,
     BetweenNodes,
     Collocation,
     Effort,
@@ -56,14 +96,27 @@ from solvers import (
     GridDP,
     HorizonContinuation,
     IndirectShooting,
+    LinearMPC,
+    Mesh,
     MultipleShooting,
     ParameterContinuation,
+    PrioritisedKinematics,
     ReverseShooting,
+    Riccati,
     Schuetz,
     StagewiseNewton,
     certify,
+    descend,
+    enumerate_extremals,
+    gpc_loop,
     multistart,
+    raise_until_clear,
+    random_guesses,
     refined,
+    repel,
+    seeds_around,
+    self_motions,
+    track,
 )
 
 
@@ -86,6 +139,17 @@ def run(**data: Any) -> Solution:
     return MultipleShooting(10).build(problem()).run(**data)
 
 
+@cache
+def driver() -> MPC:
+    return MPC(ocp=problem(), solver=MultipleShooting(10), dt=0.1, compiled=False)
+
+
+def loop(**changes: Any) -> Rollout:
+    given: dict[str, Any] = {"controller": driver(), "plant": Plant(ocp=problem())}
+    given |= {"x0": problem().start(), "duration": 0.1, "dt": 0.1}
+    return closed_loop(**(given | changes))
+
+
 def point(**changes: Any) -> OCP:
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
     model = Model(name="point", x=x, u=u, f=ca.vertcat(x[1], u))
@@ -101,6 +165,32 @@ def dynamics(**changes: Any) -> Model:
 
 Wrong = Callable[[], Any]
 ANY: Any = MultipleShooting  # a class where an instance is needed
+NOWHERE = "no such folder/file"
+T, PLANT = ca.SX.sym("t"), Carima((1.0, -0.5), (1.0,))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        StagewiseNewton,
+        Collocation,
+        Schuetz,
+        IndirectShooting,
+        ReverseShooting,
+        GridDP,
+        Greedy,
+        Batch,
+        LinearMPC,
+        Riccati,
+        BetweenNodes,
+        lambda: AugmentedLagrangian(MultipleShooting()),
+    ],
+)
+def test_no_solver_builds_what_is_no_problem(make: Callable[[], Any]) -> None:
+    for wrong in (3, "a", None, OCP, answer()):
+        with pytest.raises(ProblemError, match=r"the problem is (a|the class) .*, OCP is needed"):
+            make().build(wrong)
+
 
 CALLS: list[tuple[str, Wrong]] = [
     # Functions of a solution.
@@ -211,7 +301,95 @@ CALLS: list[tuple[str, Wrong]] = [
     (r"plant: lag \[s\] = 'a'", lambda: Plant(ocp=problem(), **{"lag": "a"})),
     ("plant: jitter = 1.0, it must be 0 or more, below 1",
      lambda: Plant(ocp=problem(), jitter=1.0)),
+    (r"MPC of Van der Pol: t \[s\] = 'now'", lambda: driver().step(problem().start(), *["now"])),
+    ("MPC of Van der Pol: x is not numeric: 'a'", lambda: driver().step("a", 0.0)),
+    (r"MPC of Van der Pol: x has shape \(3,\), \(2,\) is needed",
+     lambda: driver().step(np.zeros(3), 0.0)),
+    ("MPC of Van der Pol: plant is a OCP, Plant is needed",
+     lambda: driver().run(*[problem()], problem().start(), 1.0)),
+    (r"delay \[s\] = 'a'", lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"delay": "a"})),
+    ("MPC: parameters is a dict, a function is needed",
+     lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"parameters": {}})),
+    ("the guess is <class 'str'>",
+     lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"guess": "a"})),
+    ("applied: bounds is a tuple", lambda: Applied("rate", *[(-1.0, 1.0)])),
+    ("plant: saturation is a float", lambda: Plant(ocp=problem(), **{"saturation": 1.0})),
+    ("plant: disturbance is a float", lambda: Plant(ocp=problem(), **{"disturbance": 1.0})),
+    ("law: law is a float, a function is needed", lambda: Law(**{"law": 1.0})),
+    (r"law: delay \[s\] = -1.0", lambda: Law(law=lambda x, t: [0.0], delay=-1.0)),
+    ("law: the plan to follow is a OCP", lambda: Law.following(*[problem()])),
+    ("closed loop: controller is a MultipleShooting", lambda: loop(controller=ANY())),
+    ("closed loop: controller is the class MPC, Controller is needed$",
+     lambda: loop(controller=MPC)),
+    ("closed loop: plant is a OCP", lambda: loop(plant=problem())),
+    (r"closed loop: duration \[s\] = 'a'", lambda: loop(duration="a")),
+    ("closed loop: watch is a int, a function is needed", lambda: loop(watch=3)),
+    ("flight recorder: mpc is a Law", lambda: FlightRecorder(*[Law(law=lambda x, t: [0.0])], "f")),
+    ("the path of a flight record is a int", lambda: FlightRecorder(driver(), *[3])),
+    ("the flight record .* cannot be written: No such", lambda: FlightRecorder(driver(), NOWHERE)),
+    ("the flight record .* cannot be read: No such", lambda: next(records(NOWHERE))),
+    ("the flight record .* cannot be read: No such", lambda: replay(driver(), NOWHERE, 0)),
+    ("replay: mpc is a OCP", lambda: replay(*[problem()], NOWHERE, 0)),
+    # Other functions of a problem.
+    ("stationary: the matrices is a int", lambda: stationary(*[3])),
+    ("with_stationary_end: the problem is a int", lambda: with_stationary_end(*[3])),
+    ("with_input_rate: the problem is a int", lambda: with_input_rate(*[3], rate=Box())),
+    ("with_input_rate: rate is a float",
+     lambda: with_input_rate(thesis_tracking(3), **{"rate": 1.0})),
+    ("instantaneous: the problem is a int", lambda: instantaneous(*[3])),
+    ("saturated_lqr: the problem is a int", lambda: saturated_lqr(*[3])),
+    ("start_fault: the problem is a int", lambda: start_fault(*[3], answer().data)),
+    ("curvature: the problem is a int", lambda: curvature(*[3], RK4())),
+    ("assembled: the problem is a int", lambda: assembled(*[3], RK4())),
+    ("hamiltonian: the problem is a ndarray", lambda: hamiltonian(*[np.zeros(2)])),
+    ("symbol_kind: the function is a SX", lambda: symbol_kind(*[ca.SX.sym("x")])),
+    ("compiled: the function is a OCP", lambda: compiled(*[problem()])),
+    ("c_code: the function is a int", lambda: c_code(*[3])),
+    ("enumerate_extremals: the problem is a int", lambda: enumerate_extremals(*[3])),
+    ("random_guesses: the problem is a int", lambda: random_guesses(*[3], 2, 0)),
+    ("random_guesses: number must be", lambda: random_guesses(problem(), -1, 0)),
+    ("multistart: violation = 'a'",
+     lambda: multistart(problem(), ANY(10), 2, 0, **{"violation": "a"})),
+    ("self_motions: manifold is a int", lambda: self_motions(*[3], [])),
+    ("seeds_around: manifold is a int", lambda: seeds_around(*[3], np.zeros(2))),
+    ("raise until clear: soft is a int",
+     lambda: raise_until_clear(*[3], problem(), ANY(), parameter="k")),
+    ("mesh: edges is a int", lambda: Mesh(*[3], (3,))),
+    ("mesh: edge = 'a'", lambda: Mesh(*[("a", 1.0)], (3,))),
+    ("axis: lower = None", lambda: Axis(*[None], 1.0, 5)),
+    ("kinematics: tasks must be a tuple", lambda: PrioritisedKinematics(*[3])),
+    ("task 'hand': q is no column", lambda: track("hand", q=3, t=T, value=T, desired=T)),
+    ("task 'rest': t is no column", lambda: descend("rest", q=T, t="t", potential=T, gain=1.0)),
+    ("task 'wall': repulsion is a int", lambda: repel("wall", q=T, t=T, distance=T, repulsion=3)),
+    ("GPC: input_bounds is a tuple", lambda: GPC(**{"input_bounds": (-1.0, 1.0)})),
+    ("GPC: model is a int", lambda: GPC().build(*[3])),
+    ("GPC loop: law is a int", lambda: gpc_loop(*[3], CarimaPlant(PLANT), 1.0, 5)),
+    ("GPC loop: plant is a Carima", lambda: gpc_loop(GPC().build(PLANT), *[PLANT], 1.0, 5)),
     # Models.
+    ("carima plant: model is a int", lambda: CarimaPlant(*[3])),
+    ("carima: model is a CarimaPlant",
+     lambda: carima_ocp(*[CarimaPlant(PLANT)], reference=np.ones(4), weight=1.0)),
+    ("cart-pole: system is a int", lambda: cart_pole_swing_up(*[3])),
+    ("cart-pole: distance = 'a'", lambda: cart_pole_upright(**{"distance": "a"})),
+    ("bounded_ocp: scenario is a int", lambda: bounded_ocp(*[3])),
+    ("unbounded_ocp: scenario is a int", lambda: unbounded_ocp(*[3])),
+    ("link distances: arm is a int", lambda: link_distances(*[3], T, Disc([0.0, 0.0], 0.1))),
+    ("squared manipulability: arm is a int", lambda: squared_manipulability(*[3], T)),
+    ("clearance: arm is a int", lambda: clearance_constraint(*[3], T, (), 0.1)),
+    ("redundant arm: arm is a int",
+     lambda: redundancy_ocp(*[3], line([0, 1], [0, 1]), theta0=[0.0], horizon=1.0)),
+    ("path is a int, a function is needed", lambda: path_position(*[3], T)),
+    ("lq_regulator: plant is a Model",
+     lambda: lq_regulator(*[stable_plant().model], Q=1.0, R=1.0, x0=np.ones(3), horizon=3)),
+    ("lq_regulator: plant is a int", lambda: thesis_regulator(*[3], 5)),
+    ("tracking_ocp: plant is a int",
+     lambda: tracking_ocp(*[3], np.ones(3), Q=1.0, R=1.0, x0=[0.0], horizon=2)),
+    ("thesis_tracking: steps must be", lambda: thesis_tracking(*["a"])),
+    ("sinusoid: t is not numeric", lambda: sinusoid("a")),
+    ("step: t is not numeric", lambda: step_reference("a", [1.0])),
+    ("linear: A is no matrix", lambda: state_space(3, [[1.0]])),
+    ("mass-spring-damper: stiffness = 'a'", lambda: mass_spring_damper(**{"stiffness": "a"})),
+    ("obstacle data: rows is a int", lambda: obstacles_from_data(*[3])),
     ("cart-pole: pole = 'a'", lambda: CartPole(**{"pole": "a"})),
     ("cart-pole: force = 'a'", lambda: cart_pole_swing_up(**{"force": "a"})),
     ("Goddard: fastest = None", lambda: goddard(**{"fastest": None})),
@@ -233,6 +411,8 @@ CALLS: list[tuple[str, Wrong]] = [
     ("solution: cost is a str", lambda: answer().with_(cost="a")),
     ("the problem that here.npz is to be a solution of is a str",
      lambda: Solution.load("here.npz", *["Van der Pol"])),
+    ("the path of a saved solution is a OCP", lambda: answer().save(*[problem()])),
+    ("the saved solution .* cannot be written: No such file", lambda: answer().save(NOWHERE)),
     ("the path of a saved solution is a OCP", lambda: Solution.load(problem(), problem())),
 ]  # fmt: skip
 

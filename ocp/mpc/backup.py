@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import numbers, positive
+from ocp.expressions import instance, numbers, positive
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import stationary
 from ocp.linear.structure import linear_quadratic
@@ -52,6 +52,7 @@ def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Feedback:
         UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse, and a matrix that
             depends on time or parameters.
     """
+    instance(ocp, OCP, "saturated_lqr: the problem")
     endless = _endless(ocp, dt)
     lq = linear_quadratic(endless if dt is None else discretise(endless, dt))
     if lq.fixed is None:
@@ -117,6 +118,7 @@ def instantaneous(
         ProblemError: if the reach is not positive, or ``sent`` is neither.
         UnsupportedProblem: what the minimum principle refuses, see ``derive``.
     """
+    instance(ocp, OCP, "instantaneous: the problem")
     positive(reach, "instantaneous control: reach [s]")
     if sent not in ("control", "rate"):
         raise ProblemError(f"instantaneous control: sent = {sent!r} is neither control nor rate")

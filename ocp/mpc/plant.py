@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError
-from ocp.expressions import instance, not_negative, numbers, whole
+from ocp.expressions import function, instance, not_negative, numbers, whole
 from ocp.mpc.rehearsal import Rehearsal
 from ocp.problem import OCP
 
@@ -51,9 +51,13 @@ class Plant:
         """Check the numbers."""
         instance(self.ocp, OCP, "plant: ocp")
         whole(self.substeps, "plant: substeps")
+        for name in ("disturbance", "parameters"):
+            if getattr(self, name) is not None:
+                function(getattr(self, name), f"plant: {name}")
         nx, nu = self.ocp.model.nx, self.ocp.model.nu
         for name in ("process_noise", "measurement_noise"):
             object.__setattr__(self, name, numbers(getattr(self, name), nx, f"plant: {name}"))
+        instance(self.saturation, Box, "plant: saturation")
         object.__setattr__(self, "saturation", self.saturation.sized(nu, "plant: saturation"))
         not_negative(self.lag, "plant: lag [s]")
         not_negative(self.jitter, "plant: jitter", below=1.0)

@@ -95,6 +95,7 @@ class Collocation(Solver):
         Raises:
             UnsupportedProblem: for a discrete-time model, which has nothing to collocate.
         """
+        instance(ocp, OCP, "collocation: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"

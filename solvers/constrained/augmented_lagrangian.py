@@ -98,6 +98,7 @@ class AugmentedLagrangian(Solver):
             UnsupportedProblem: if there is nothing to relax, in discrete time, or from the inner
                 solver.
         """
+        instance(ocp, OCP, "augmented Lagrangian: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "

@@ -69,6 +69,7 @@ class BetweenNodes(Solver):
         Raises:
             UnsupportedProblem: in discrete time, where nothing lies between the nodes.
         """
+        instance(ocp, OCP, "between nodes: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "

@@ -58,6 +58,8 @@ def raise_until_clear(
     Raises:
         ProblemError: if the problems do not fit, or the parameter is none or not positive.
     """
+    instance(soft, OCP, "raise until clear: soft")
+    instance(hard, OCP, "raise until clear: hard")
     instance(solver, Solver, "raise until clear: solver")
     whole(most, "raise until clear: most")
     price = _first_price(soft, parameter)

@@ -95,6 +95,7 @@ class Schuetz(Solver):
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""
+        instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
         exact = self.gradient == "discrete"
         sweeps = Sweeps.of(ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled)

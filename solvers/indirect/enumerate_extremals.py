@@ -17,6 +17,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     evaluate,
+    instance,
     positive,
     whole,
 )
@@ -107,6 +108,7 @@ def enumerate_extremals(
             constraints, and a free final time.
         ProblemError: if the target is out of reach, or the start is not on the manifold.
     """
+    instance(ocp, OCP, "enumerate_extremals: the problem")
     whole(points, "enumerate_extremals: points")
     if keep is not None:
         whole(keep, "enumerate_extremals: keep")

@@ -92,6 +92,7 @@ class ReverseShooting(Solver):
 
     def build(self, ocp: OCP) -> "ReverseShootingProgram":
         """Derive the canonical flow and the conditions at both ends."""
+        instance(ocp, OCP, "reverse shooting: the problem")
         refuse_what_reverse_cannot(ocp)
         if self.boundary == 4 and ocp.has_free_start:
             raise UnsupportedProblem(

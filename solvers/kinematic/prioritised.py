@@ -43,7 +43,7 @@ class PrioritisedKinematics:
 
     def __post_init__(self) -> None:
         """Check the tasks against each other."""
-        if isinstance(self.tasks, Task) or not self.tasks:
+        if not isinstance(self.tasks, tuple | list) or not self.tasks:
             raise ProblemError("kinematics: tasks must be a tuple of at least one Task")
         tasks = tuple(self.tasks)
         for i, task in enumerate(tasks):

@@ -6,7 +6,7 @@ from functools import reduce
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, positive
+from ocp import ProblemError, instance, positive
 from solvers.kinematic.task import Task, as_column
 
 
@@ -89,6 +89,7 @@ def repel(name: str, *, q: ca.SX, t: ca.SX, distance: ca.SX, repulsion: Repulsio
     Raises:
         ProblemError: if the distance is no expression.
     """
+    instance(repulsion, Repulsion, f"task '{name}': repulsion")
     distances = as_column(distance, f"task '{name}': distance")
     d = reduce(ca.fmin, ca.vertsplit(distances))
     return Task(

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from ocp import Box, ProblemError, Status, not_negative, positive
+from ocp import Box, ProblemError, Status, instance, not_negative, positive
 from solvers.linear.elastic import least_violation
 from solvers.linear.qp_backends import Backend, qp_backend
 from solvers.linear.quadratic_program import QP
@@ -69,6 +69,7 @@ class GPC:
         positive(self.tolerance, "GPC: tolerance", below=1.0)
         not_negative(self.weight, "GPC: weight")
         for name in ("increment_bounds", "input_bounds", "output_bounds"):
+            instance(getattr(self, name), Box, f"GPC: {name}")
             object.__setattr__(self, name, getattr(self, name).sized(1, f"GPC: {name}"))
 
     def build(self, model: CarimaModel) -> "GPCLaw":
@@ -81,6 +82,7 @@ class GPC:
             ProblemError: if the horizons do not fit, if the increments are not determined,
                 or if the weight is 0 where the plant's zeros then make the loop unstable.
         """
+        instance(model, CarimaModel, "GPC: model")
         first = model.delay + 1
         n1 = first if self.n1 is None else self.n1
         nu = self.n2 - model.delay if self.nu is None else self.nu

@@ -1,16 +1,17 @@
 """A plant under generalised predictive control, with noise and a load."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError, Status, whole
+from ocp import ProblemError, Status, instance, whole
 from solvers.predictive.carima_prediction import history
 from solvers.predictive.gpc import GPCLaw
 
 
+@runtime_checkable
 class Plant(Protocol):
     """Something with one input and one output: ``models.CarimaPlant``."""
 
@@ -75,6 +76,8 @@ def gpc_loop(
     Raises:
         ProblemError: if the reference, the noise or the load is too short.
     """
+    instance(law, GPCLaw, "GPC loop: law")
+    instance(plant, Plant, "GPC loop: plant")
     whole(steps, "GPC loop: steps")
     n2 = law.prediction.n2
     w = history(reference, "reference")

@@ -21,6 +21,7 @@ from ocp import (
     Start,
     Status,
     Work,
+    instance,
     positive,
     whole,
 )
@@ -75,6 +76,7 @@ class Greedy(Solver):
 
     def build(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""
+        instance(ocp, OCP, "Greedy: the problem")
         refuse_free_ends(ocp, "Greedy")
         stage = Stage.of(ocp, self.integrator, held=True)
         n, options = ocp.steps or self.intervals, _options(self)

@@ -21,6 +21,7 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    instance,
     not_negative,
     whole,
 )
@@ -88,6 +89,7 @@ class GridDP(Solver):
 
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
+        instance(ocp, OCP, "GridDP: the problem")
         refuse_free_ends(ocp, "GridDP")
         self._refuse_equations(ocp)
         m = ocp.model

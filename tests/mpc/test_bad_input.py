@@ -215,8 +215,8 @@ def test_a_function_of_the_plant_that_does_not_fit(plant, message) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"dt": 0.0}, "is no run"),
-        ({"dt": np.nan}, "is no run"),
+        ({"dt": 0.0}, r"dt \[s\] = 0.0, it must be positive"),
+        ({"dt": np.nan}, r"dt \[s\] = nan"),
         ({"dt": 0.1, "initial_input": [1.0, 2.0]}, "initial_input has 2 entries"),
         ({"dt": 0.1, "initial_input": np.nan}, "a finite number is needed"),
     ],
