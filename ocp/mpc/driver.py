@@ -16,9 +16,10 @@ from ocp.mpc.asking import INSIDE
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.fallback import Backup, Choice, backup_of
-from ocp.mpc.ladder import Ladder, Moment
+from ocp.mpc.ladder import Ladder
 from ocp.mpc.loop import Watch, closed_loop
 from ocp.mpc.memory import Memory
+from ocp.mpc.moment import Moment
 from ocp.mpc.plant import Plant
 from ocp.mpc.rollout import Rollout
 from ocp.parameters import ParameterValues
