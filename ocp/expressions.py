@@ -1,4 +1,4 @@
-"""Checks on CasADi expressions, in words that name what is wrong."""
+"""Checks on CasADi expressions and on what a user gives, in words that name what is wrong."""
 
 from collections.abc import Sequence
 
