@@ -7,13 +7,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
+from models._numbers import vector
 from models.arm import PlanarArm
 from models.distance_cost import DistanceCost
 from models.distances import signed_distance
 from models.obstacles import Disc, Obstacle, link_distances
 from models.sampling import sampled
-from ocp import Constraint, Parameter, ProblemError, Signal, instance
+from ocp import Constraint, Parameter, ProblemError, Signal, instance, not_negative, positive
 
 
 def clearance_constraint(
@@ -27,6 +27,7 @@ def clearance_constraint(
         obstacles: from whose cores the links keep away.
         clearance: one distance for all, or one for each obstacle [m].
     """
+    instance(arm, PlanarArm, "clearance: arm")
     least = np.broadcast_to(np.asarray(clearance, dtype=float).reshape(-1), len(obstacles))
     distances = [link_distances(arm, theta, obstacle) for obstacle in obstacles]
     return Constraint("clearance", ca.vertcat(*distances), lower=np.repeat(least, arm.n))
@@ -59,8 +60,9 @@ def check_avoidance(
         raise ProblemError(f"{name}: a clearance is asked for, but there are no obstacles")
     count = np.size(clearance)
     least = vector(clearance, 1 if count == 1 else len(obstacles), f"{name}: clearance")
-    for obstacle, d in zip(obstacles, np.broadcast_to(least, len(obstacles)), strict=True):
-        at_least(d, 0.0, f"{name}: clearance", strictly=isinstance(obstacle, Disc))
+    for obstacle, d in zip(obstacles, np.broadcast_to(least, len(obstacles)).tolist(), strict=True):
+        check = positive if isinstance(obstacle, Disc) else not_negative
+        check(d, f"{name}: clearance")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -6,8 +6,19 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
-from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, numbers
+from models._numbers import vector
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    Guess,
+    Model,
+    ProblemError,
+    instance,
+    not_negative,
+    positive,
+    real,
+)
 
 # Weights of position, angle, velocity and angular velocity, and of the force.
 _STAGE, _END, _FORCE = (1.0, 1.0, 0.1, 0.1), (100.0, 100.0, 10.0, 10.0), 0.01
@@ -62,7 +73,8 @@ class CartPole:
         """Check the numbers."""
         for entry in fields(self):
             name = f"cart-pole: {entry.name}"
-            at_least(getattr(self, entry.name), 0.0, name, strictly=entry.name != "gravity")
+            check = not_negative if entry.name == "gravity" else positive
+            check(getattr(self, entry.name), name)
 
     def model(self) -> Model:
         """Return the model; state (p [m], θ [rad], their rates), control: the force [N]."""
@@ -123,8 +135,8 @@ def cart_pole_swing_up(
     Raises:
         ProblemError: if a bound is negative, or the end lies beyond the track.
     """
-    model = (system or CartPole()).model()
-    end = [float(distance), np.pi, 0.0, 0.0]
+    model, goal = _model(system), real(distance, "cart-pole: distance")
+    end = [goal, np.pi, 0.0, 0.0]
     return OCP(
         name="cart-pole swing-up",
         model=model,
@@ -180,11 +192,11 @@ def cart_pole_upright(
         ProblemError: if a bound or weight is negative, or the target lies beyond the track or
             in its cushion.
     """
-    model = (system or CartPole()).model()
-    off = model.x - ca.DM([distance, np.pi, 0.0, 0.0])
+    model, goal = _model(system), real(distance, "cart-pole: distance")
+    off = model.x - ca.DM([goal, np.pi, 0.0, 0.0])
     q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
-    r = at_least(effort, 0.0, "cart-pole: effort", strictly=True)
-    soft, on_track = at_least(cushion, 0.0, "cart-pole: cushion"), _on(track, distance)
+    r = positive(effort, "cart-pole: effort")
+    soft, on_track = not_negative(cushion, "cart-pole: cushion"), _on(track, distance)
     if soft and not abs(distance) <= track - soft < np.inf:
         raise ProblemError(
             f"cart-pole: with a cushion of {soft} m the track of {track} m must be finite, and "
@@ -204,11 +216,15 @@ def cart_pole_upright(
     )
 
 
+def _model(system: CartPole | None) -> Model:
+    if system is not None:
+        instance(system, CartPole, "cart-pole: system")
+    return (system or CartPole()).model()
+
+
 def _within(force: float, what: str) -> Box:
     """Return |u| <= force; inf is allowed."""
-    largest = float(numbers(force, 1, f"cart-pole: {what}", finite=False)[0])
-    if largest < 0.0:
-        raise ProblemError(f"cart-pole: {what} = {largest}, it must not be negative")
+    largest = not_negative(force, f"cart-pole: {what}", finite=False)
     return Box(-largest, largest)
 
 

@@ -4,11 +4,10 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from models._numbers import at_least
 from models.distance_cost import DistanceCost
 from models.obstacles import link_distances
 from models.scenarios import ArmScenario
-from ocp import OCP, Parameter
+from ocp import OCP, Parameter, instance, positive
 
 WEIGHT = "weight"
 
@@ -35,8 +34,8 @@ class BarrierCost:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        at_least(self.gain, 0.0, "barrier cost: gain", strictly=True)
-        at_least(self.influence, 0.0, "barrier cost: influence", strictly=True)
+        positive(self.gain, "barrier cost: gain")
+        positive(self.influence, "barrier cost: influence")
 
     def at_distance(self, distance: ca.SX, radius: float) -> ca.SX:
         """Return p0 element by element; ``inf`` within the radius.
@@ -57,6 +56,7 @@ def bounded_ocp(scenario: ArmScenario, *, weight: float = 1.0) -> OCP:
         scenario: the arm and its disc.
         weight: k unless a run says otherwise.
     """
+    instance(scenario, ArmScenario, "bounded_ocp: scenario")
     bare, k = scenario.ocp(weight=0.0), ca.SX.sym("k")
     cost = DistanceCost(scenario.gain, scenario.influence)
     return replace(
@@ -75,6 +75,7 @@ def unbounded_ocp(scenario: ArmScenario, *, gain: float = 1e-3) -> OCP:
         scenario: the arm and its disc.
         gain: s of the barrier [m²].
     """
+    instance(scenario, ArmScenario, "unbounded_ocp: scenario")
     bare = scenario.ocp(weight=0.0)
     cost = BarrierCost(gain, scenario.influence)
     distances = link_distances(scenario.arm, bare.model.x, scenario.disc)

@@ -7,10 +7,9 @@ from typing import Literal
 
 import casadi as ca
 
-from models._numbers import at_least
 from models.arm import PlanarArm
 from models.obstacles import Obstacle, link_distances
-from ocp import ProblemError
+from ocp import ProblemError, not_negative, positive
 
 Combine = Literal["sum", "closest"]
 
@@ -44,8 +43,8 @@ class DistanceCost:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        at_least(self.gain, 0.0, "distance cost: gain")
-        at_least(self.influence, 0.0, "distance cost: influence", strictly=True)
+        not_negative(self.gain, "distance cost: gain")
+        positive(self.influence, "distance cost: influence")
         if self.combine not in ("sum", "closest"):
             raise ProblemError(
                 f"distance cost: combine = {self.combine!r}, neither sum nor closest"

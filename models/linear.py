@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
-from ocp import Model, ProblemError
+from models._numbers import vector
+from ocp import Model, ProblemError, positive, real
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,7 +44,10 @@ class LinearPlant:
 
     def __post_init__(self) -> None:
         """Check every shape."""
-        n, m = np.shape(self.A)[0] if np.ndim(self.A) == 2 else 0, np.shape(self.B)[-1]
+        for label in ("A", "B"):
+            if np.ndim(getattr(self, label)) != 2:
+                raise ProblemError(f"{self.name}: {label} is no matrix")
+        n, m = len(self.A), np.shape(self.B)[1]
         c = np.eye(n) if np.size(self.C) == 0 else np.atleast_2d(self.C)
         d = np.zeros((len(c), m)) if np.size(self.D) == 0 else np.atleast_2d(self.D)
         shapes = {"A": (n, n), "B": (n, m), "C": (len(c), n), "D": (len(c), m)}
@@ -79,7 +82,7 @@ class LinearPlant:
 
     def sampled(self, dt: float) -> "LinearPlant":
         """Return the discrete-time plant under a zero-order hold of dt [s], through scipy."""
-        at_least(dt, 0.0, f"{self.name}: dt", strictly=True)
+        positive(dt, f"{self.name}: dt")
         if self.dt is not None:
             raise ProblemError(f"{self.name}: sampled already, every {self.dt:g} s")
         from scipy import signal  # as above
@@ -143,10 +146,12 @@ def mass_spring_damper(
         damping: c [Ns/m].
         mass: m [kg], positive.
     """
-    m = at_least(mass, 0.0, "mass-spring-damper: mass", strictly=True)
+    k = real(stiffness, "mass-spring-damper: stiffness")
+    c = real(damping, "mass-spring-damper: damping")
+    m = positive(mass, "mass-spring-damper: mass")
     return LinearPlant(
         name="mass-spring-damper",
-        A=np.array([[0.0, 1.0], [-stiffness / m, -damping / m]]),
+        A=np.array([[0.0, 1.0], [-k / m, -c / m]]),
         B=np.array([[0.0], [1.0 / m]]),
         C=np.array([[1.0, 0.0]]),
         x_names=("position", "velocity"),

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
+from models._numbers import vector
 from models.linear import LinearPlant, mass_spring_damper, matrix
-from ocp import OCP, Box, ProblemError, Signal
+from ocp import OCP, Box, ProblemError, Signal, instance, positive, whole
 
 # More asymmetry of a weight than this, relative to its largest entry, is no slip of rounding.
 _SYMMETRIC = 1e-12
@@ -44,6 +44,7 @@ def lq_regulator(
     Raises:
         ProblemError: if a weight has a wrong size, is not symmetric or not (semi-)definite.
     """
+    instance(plant, LinearPlant, "lq_regulator: plant")
     return _problem(plant, ca.SX.zeros(len(plant.A)), (), Q, R, P, x0, horizon,
                     (control_bounds, state_bounds))  # fmt: skip
 
@@ -78,6 +79,7 @@ def tracking_ocp(
         control_bounds: box around the controls.
         state_bounds: box around the states.
     """
+    instance(plant, LinearPlant, "tracking_ocp: plant")
     w = ca.vertcat(*[ca.SX.sym(f"reference of {name}") for name in plant.x_names])
     signals = (Signal("reference", w, reference),)
     return _problem(plant, w, signals, Q, R, P, x0, horizon, (control_bounds, state_bounds))
@@ -94,8 +96,8 @@ def sinusoid(
         period: [s].
         moving: False: the velocity of the reference is zero throughout.
     """
-    rate = 2.0 * np.pi / at_least(period, 0.0, "sinusoid: period", strictly=True)
-    phase = rate * np.asarray(t, dtype=float)
+    rate = 2.0 * np.pi / positive(period, "sinusoid: period")
+    phase = rate * vector(t, np.size(t), "sinusoid: t")
     velocity = amplitude * rate * np.cos(phase) * float(moving)
     return np.stack([amplitude * np.sin(phase), velocity], axis=1)
 
@@ -108,8 +110,8 @@ def step_reference(t: ArrayLike, value: Sequence[float], *, at: float = 0.0) -> 
         value: (n,).
         at: when it steps [s].
     """
-    times = np.asarray(t, dtype=float)
-    return np.where(times[:, None] >= at - 1e-9, np.asarray(value, dtype=float), 0.0)
+    times, after = vector(t, np.size(t), "step: t"), vector(value, np.size(value), "step: value")
+    return np.where(times[:, None] >= at - 1e-9, after, 0.0)
 
 
 def thesis_regulator(plant: LinearPlant, steps: int) -> OCP:
@@ -127,6 +129,8 @@ def thesis_tracking(steps: int, *, dt: float = 0.05, moving: bool = True) -> OCP
         dt: step [s].
         moving: whether the reference has the velocity of the sinusoid, or none.
     """
+    whole(steps, "thesis_tracking: steps")
+    positive(dt, "thesis_tracking: dt [s]")
     return tracking_ocp(
         mass_spring_damper().sampled(dt),
         sinusoid(dt * np.arange(steps + 1), moving=moving),

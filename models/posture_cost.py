@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
+from models._numbers import vector
 from models.arm import PlanarArm
-from ocp import ProblemError
+from ocp import ProblemError, instance, not_negative, positive
 
 
 class PostureCost(ABC):
@@ -52,7 +52,7 @@ class JointLimitCost(PostureCost):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        at_least(self.gain, 0.0, "joint limit cost: gain")
+        not_negative(self.gain, "joint limit cost: gain")
         for name in ("lower", "upper"):
             values = getattr(self, name)
             what = f"joint limit cost: {name}"
@@ -97,8 +97,8 @@ class ManipulabilityCost(PostureCost):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        at_least(self.gain, 0.0, "manipulability cost: gain")
-        at_least(self.influence, 0.0, "manipulability cost: influence", strictly=True)
+        not_negative(self.gain, "manipulability cost: gain")
+        positive(self.influence, "manipulability cost: influence")
 
     def of(self, arm: PlanarArm, theta: ca.SX) -> ca.SX:
         """Return the cost of a configuration (n,) [rad]."""
@@ -113,6 +113,7 @@ def squared_manipulability(arm: PlanarArm, theta: ca.SX) -> ca.SX:
         arm: the arm, n links.
         theta: configuration (n,) [rad].
     """
+    instance(arm, PlanarArm, "squared manipulability: arm")
     jacobian = arm.jacobian(theta)
     first, second = jacobian[0, :], jacobian[1, :]
     return ca.sumsqr(first) * ca.sumsqr(second) - ca.dot(first, second) ** 2

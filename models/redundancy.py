@@ -7,7 +7,7 @@ from typing import Literal
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from models._numbers import at_least, vector
+from models._numbers import vector
 from models.arm import PlanarArm
 from models.avoidance import Surroundings, check_avoidance, clearance_constraint
 from models.distance_cost import DistanceCost
@@ -15,7 +15,18 @@ from models.obstacles import Obstacle
 from models.paths import Path, path_position, path_velocity
 from models.posture_cost import PostureCost
 from models.task import Task
-from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal, instance
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    Model,
+    Parameter,
+    ProblemError,
+    Signal,
+    instance,
+    not_negative,
+    positive,
+)
 
 Cost = Literal["regularised", "raw"]
 Form = Literal["null-space", "velocity"]
@@ -104,10 +115,11 @@ def redundancy_ocp(
             obstacle on the base, a start inside an obstacle.
     """
     t = ca.SX.sym("t") if t is None else t
+    instance(arm, PlanarArm, f"{name}: arm")
     start = vector(theta0, arm.n, f"{name}: theta0")
-    duration = at_least(horizon, 0.0, f"{name}: horizon", strictly=True)
-    k = at_least(weight, 0.0, f"{name}: weight")
-    gain = at_least(correction, 0.0, f"{name}: correction")
+    duration = positive(horizon, f"{name}: horizon")
+    k = not_negative(weight, f"{name}: weight")
+    gain = not_negative(correction, f"{name}: correction")
     _check_choices(name, cost, form)
     check_avoidance(name, obstacles, distance_cost, clearance)
     _check_kinds(name, posture_costs, joint_bounds, velocity_bounds)

@@ -7,7 +7,7 @@ from ocp.constraint import Box, Constraint
 from ocp.curvature import curvature
 from ocp.data import Data
 from ocp.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
-from ocp.expressions import instance, numbers, positive, whole
+from ocp.expressions import function, instance, not_negative, numbers, positive, real, whole
 from ocp.functions import Functions
 from ocp.given_start import start_fault
 from ocp.guess import Guess
@@ -106,14 +106,17 @@ __all__ = [
     "discretise",
     "elevated",
     "evaluate",
+    "function",
     "hamiltonian",
     "instance",
     "instantaneous",
     "interpolate",
     "linear_quadratic",
     "most_violated",
+    "not_negative",
     "numbers",
     "positive",
+    "real",
     "records",
     "replay",
     "replay_all",

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 
+from ocp.expressions import instance
 from ocp.integrate import Integrator, Stage
 from ocp.problem import OCP
 from ocp.tape import Tape
@@ -24,6 +25,7 @@ def assembled(ocp: OCP, integrator: Integrator) -> ca.Function:
         ocp: the problem.
         integrator: one-step method.
     """
+    instance(ocp, OCP, "assembled: the problem")
     step = Stage.of(ocp, integrator, held=True).step
     along = ["x", "u0", "t", "h"] if ocp.has_free_time else ["x", "u0"]
     step = _again(step, {"is_diff_in": [name in along for name in step.name_in()]})

@@ -19,11 +19,13 @@ def once_per_problem(derive: "Callable[[OCP], T]") -> "Callable[[OCP], T]":
 
     @wraps(derive)
     def derived(ocp: "OCP") -> T:
-        if ocp not in kept:
+        try:
+            return kept[ocp]
+        except (KeyError, TypeError):  # not yet, or no problem: then there may be no key of it
             from ocp.problem import OCP  # which is built on this
 
             instance(ocp, OCP, f"{derive.__name__.lstrip('_')}: the problem")
-            kept[ocp] = derive(ocp)
+        kept[ocp] = derive(ocp)
         return kept[ocp]
 
     return derived

@@ -19,6 +19,7 @@ from typing import Any
 import casadi as ca
 
 from ocp.errors import ProblemError
+from ocp.expressions import instance
 
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 # The name that the generated C gives itself; the content of a library must not depend on its file.
@@ -97,6 +98,7 @@ def compiled(
     Raises:
         ProblemError: if ``along`` names no input.
     """
+    instance(function, ca.Function, "compiled: the function")
     for name in along:
         if name not in function.name_in():
             raise ProblemError(f"compiled: {function.name()} has no input '{name}'")
@@ -121,6 +123,7 @@ def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:
         function: what to write.
         along: inputs along which it is differentiated; with none there are no derivatives.
     """
+    instance(function, ca.Function, "c_code: the function")
     functions = [function]
     if along:
         adjoint = function.reverse(1)

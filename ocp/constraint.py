@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -46,6 +46,13 @@ class Box:
         """Return the nearest point of the box, along the last axis."""
         # np.clip and np.nan_to_num cost several times what they do to a short row.
         return np.minimum(np.maximum(value, self.lower), self.upper)
+
+    def clip_expression(self, value: Any) -> Any:
+        """Return ``clip`` of a column (n,) of SX or MX; what has no bound is left as it is."""
+        lower, upper = (np.broadcast_to(b, value.numel()) for b in (self.lower, self.upper))
+        rows = zip(ca.vertsplit(value), lower, upper, strict=True)
+        raised = ((ca.fmax(v, a) if np.isfinite(a) else v, b) for v, a, b in rows)
+        return ca.vertcat(*(ca.fmin(v, b) if np.isfinite(b) else v for v, b in raised))
 
     def excess(self, value: np.ndarray) -> np.ndarray:
         """Return by how much each component lies outside: 0 inside, inf where it is no number."""

@@ -2,6 +2,7 @@
 
 import casadi as ca
 
+from ocp.expressions import instance
 from ocp.integrate import Integrator
 from ocp.problem import OCP
 from ocp.tape import Tape
@@ -30,6 +31,7 @@ def curvature(ocp: OCP, integrator: Integrator) -> ca.Function:
         ocp: the problem; what depends on a free final time is left out.
         integrator: one-step method.
     """
+    instance(ocp, OCP, "curvature: the problem")
     m, n_p = ocp.model, ocp.p.numel()
     sizes = {"x": m.nx, "u": m.nu, "t": 1, "h": 1, "p0": n_p, "p1": n_p}
     s = {name: ca.MX.sym(name, size) for name, size in sizes.items()}

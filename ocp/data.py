@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.errors import ProblemError
+from ocp.expressions import real
 from ocp.parameters import ParameterValues
 from ocp.problem import OCP
 
@@ -27,9 +27,7 @@ class Data:
 
     def __post_init__(self) -> None:
         """Refuse an initial time that is no finite number."""
-        number = isinstance(self.t0, (float, int, np.integer, np.floating))
-        if not number or not np.isfinite(self.t0):
-            raise ProblemError(f"t0 = {self.t0!r}, a finite time is needed")
+        real(self.t0, "t0")
 
     @classmethod
     def of(

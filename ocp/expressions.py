@@ -1,4 +1,4 @@
-"""Checks on CasADi expressions, in words that name what is wrong."""
+"""Checks on CasADi expressions and on what a user gives, in words that name what is wrong."""
 
 from collections.abc import Sequence
 
@@ -94,19 +94,46 @@ def whole(value: object, what: str, *, least: int = 1) -> int:
     return int(value)
 
 
-def positive(value: object, what: str, *, finite: bool = True) -> float:
+def positive(value: object, what: str, *, finite: bool = True, below: float = np.inf) -> float:
     """Return ``value`` if it is one positive number, or raise ``ProblemError``.
 
     Args:
         value: what should be a number.
         what: how a message calls it.
         finite: whether infinity is refused.
+        below: limit that a finite number must not reach.
     """
-    number = isinstance(value, int | float | np.integer | np.floating)
-    as_float = float(value) if number and not isinstance(value, bool) else np.nan
-    if not (as_float > 0.0 and (as_float < np.inf or not finite)):
-        raise ProblemError(f"{what} = {value!r}, it must be positive{', finite' * finite}")
-    return as_float
+    number = _number(value, finite, below)
+    if not number > 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be positive{_limit(finite, below)}")
+    return number
+
+
+def not_negative(value: object, what: str, *, finite: bool = True, below: float = np.inf) -> float:
+    """Return ``value`` if it is one number, 0 or more; else as ``positive``."""
+    number = _number(value, finite, below)
+    if not number >= 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be 0 or more{_limit(finite, below)}")
+    return number
+
+
+def real(value: object, what: str) -> float:
+    """Return ``value`` if it is one finite number; else as ``positive``."""
+    number = _number(value, True, np.inf)
+    if not number > -np.inf:
+        raise ProblemError(f"{what} = {value!r}, a finite number is needed")
+    return number
+
+
+def _number(value: object, finite: bool, below: float) -> float:
+    """Return one number below a limit as it is, anything else as NaN."""
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    number = float(value) if is_number and not isinstance(value, bool) else np.nan
+    return number if number < below or (number == np.inf and not finite) else np.nan
+
+
+def _limit(finite: bool, below: float) -> str:
+    return f", below {below:g}" if below < np.inf else ", finite" * finite
 
 
 def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
@@ -120,10 +147,17 @@ def instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
     Raises:
         ProblemError: otherwise, naming ``what``, its class and those allowed.
     """
-    if not isinstance(value, kind):
+    # A class has what its instances have: to a protocol it looks like one of them.
+    if isinstance(value, type) or not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(k.__name__ for k in kinds)
-        raise ProblemError(f"{what} is {_named(value)}, {names} is needed{_hint(value, kind)}")
+        raise ProblemError(f"{what} is {_named(value)}, {names} is needed{_hint(value, kinds)}")
+
+
+def function(value: object, what: str) -> None:
+    """Check that ``value`` can be called, or raise ``ProblemError`` as ``instance`` does."""
+    if isinstance(value, type) or not callable(value):
+        raise ProblemError(f"{what} is {_named(value)}, a function is needed")
 
 
 def _named(value: object) -> str:
@@ -133,11 +167,11 @@ def _named(value: object) -> str:
     return f"{'an' if name[0] in 'AEIOUaeiou' or name in ('MX', 'SX') else 'a'} {name}"
 
 
-def _hint(value: object, kind: type | tuple[type, ...]) -> str:
+def _hint(value: object, kinds: tuple[type, ...]) -> str:
     """Return what was probably meant: an instance of a class, the solution inside a result."""
     if isinstance(value, type):
-        return f": write {value.__name__}(...)" if issubclass(value, kind) else ""
-    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kind) else ""
+        return f": write {value.__name__}(...)" if {*kinds} & {*value.__mro__} else ""
+    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kinds) else ""
 
 
 def numbers(

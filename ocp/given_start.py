@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp.constraint import Box
 from ocp.data import Data
+from ocp.expressions import instance
 from ocp.problem import OCP
 
 _VIOLATED = 1e-6
@@ -18,6 +19,7 @@ def start_fault(ocp: OCP, data: Data) -> str:
     No solver imposes it, since nothing can be done about it. Only what the start alone decides
     counts: state bounds, and path constraints without the control. Up to 1e-6 is none.
     """
+    instance(ocp, OCP, "start_fault: the problem")
     if ocp.has_free_start:
         return ""
     excess, name = max(_excesses(ocp, data), key=itemgetter(0))

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from ocp.constraint import Box
 from ocp.hamiltonian import Hamiltonian
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ def minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
         return _implicit_control(ocp, h)
     at_zero = ca.substitute(e.gradient, m.u, ca.DM.zeros(m.nu))
     free = -at_zero / ca.diag(e.curvature) if diagonal else -ca.solve(e.curvature, at_zero)
-    bounded = _clip(free, box) if box.is_active else free
+    bounded = box.clip_expression(free)
     return ca.Function("control", [m.x, e.costate, m.t, p], [bounded], _LAW_INPUTS, ["u"])
 
 
@@ -45,7 +44,7 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     inputs = [ca.MX.sym(name, size) for name, size in zip(_LAW_INPUTS, sizes, strict=True)]
     x, costate, t, p = inputs
     slope = h.control_gradient(x, u, costate, t, p)
-    residual = u - _clip(u - slope, box) if box.is_active else slope
+    residual = u - box.clip_expression(u - slope) if box.is_active else slope
     options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50}
     options |= {"error_on_fail": False, "show_eval_warnings": False}
     given = ca.vertcat(*inputs)
@@ -54,7 +53,7 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     if ca.depends_on(h.expressions.curvature, m.u):  # else H is convex, and any start will do
         start = _descent(ocp, h).fold(_DESCENTS)(start, *inputs)
     found = root(start, given)
-    bounded = _clip(found, box) if box.is_active else found  # the root is, up to rounding
+    bounded = box.clip_expression(found)  # the root is, up to rounding
     return ca.Function("control", inputs, [bounded], _LAW_INPUTS, ["u"])
 
 
@@ -73,7 +72,7 @@ def _descent(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     newton = ca.solve(e.curvature + ca.diag(shift), e.gradient)
     moves = [-reach * newton for reach in _REACHES]
     moves += [sign * ca.DM(unit) for unit in np.eye(m.nu) for sign in (1.0, -1.0)]
-    tried = [_clip(m.u + move, box) for move in moves]
+    tried = [box.clip_expression(m.u + move) for move in moves]
     return ca.Function("descent", [m.u, *inputs], [_lowest(h, inputs, [m.u, *tried])])
 
 
@@ -85,7 +84,3 @@ def _lowest(h: Hamiltonian, inputs: list[ca.SX], controls: list) -> ca.SX:
         value = h.value(x, u, costate, t, p)
         best, least = ca.if_else(value < least, u, best), ca.fmin(value, least)
     return best
-
-
-def _clip(value: Any, box: Box) -> Any:
-    return ca.fmin(ca.fmax(value, ca.DM(np.asarray(box.lower))), ca.DM(np.asarray(box.upper)))

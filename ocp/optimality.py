@@ -9,6 +9,7 @@ import numpy as np
 from ocp.cache import once_per_problem
 from ocp.constraint import Constraint
 from ocp.errors import UnsupportedProblem
+from ocp.expressions import instance
 from ocp.functions import stacked
 from ocp.hamiltonian import Hamiltonian, hamiltonian
 from ocp.minimiser import minimising_control
@@ -161,6 +162,7 @@ def _end(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
 
 def symbol_kind(function: ca.Function) -> Any:
     """Return the symbol class a function can be used with: MX if it holds a root finder."""
+    instance(function, ca.Function, "symbol_kind: the function")
     return ca.SX if function.is_a("SXFunction") else ca.MX
 
 

@@ -249,11 +249,7 @@ class OCP:
             if self.model.is_discrete:
                 raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
             return
-        number = isinstance(self.horizon, int | float | np.integer | np.floating)
-        if not number or isinstance(self.horizon, bool) or not 0.0 < self.horizon < np.inf:
-            raise ProblemError(
-                f"{self.name}: horizon = {self.horizon!r}, it must be positive, finite"
-            )
+        positive(self.horizon, f"{self.name}: horizon")
         if self.model.is_discrete and not isinstance(self.horizon, int | np.integer):
             raise ProblemError(
                 f"{self.name}: horizon = {self.horizon} of a discrete-time model: it is "

@@ -272,7 +272,7 @@ class Solution:
         content |= {"status": self.status.name, "problem": self.problem.name}
         content |= {"breaks": self.breaks}
         content |= probe_entries(self.problem)
-        return write_archive(path, content)
+        return write_archive(path, "solution", content)
 
     @classmethod
     def load(cls, path: str | Path, problem: OCP) -> "Solution":

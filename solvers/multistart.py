@@ -13,6 +13,7 @@ from ocp import (
     Solver,
     evaluate,
     instance,
+    not_negative,
     positive,
     whole,
 )
@@ -72,6 +73,7 @@ def multistart(
     whole(starts, "multistart: starts")
     whole(seed, "multistart: seed", least=0)
     positive(amplitude, "multistart: amplitude")
+    not_negative(violation, "multistart: violation", finite=False)
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
     started = perf_counter()
@@ -99,6 +101,10 @@ def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> 
         amplitude: standard deviation of both parts, in the controls' own units (where a
             control is bounded, at most half its range).
     """
+    instance(ocp, OCP, "random_guesses: the problem")
+    whole(number, "random_guesses: number", least=0)
+    whole(seed, "random_guesses: seed", least=0)
+    positive(amplitude, "random_guesses: amplitude")
     rng = np.random.default_rng(seed)
     box, nu = ocp.control_bounds, ocp.model.nu
     with np.errstate(invalid="ignore"):

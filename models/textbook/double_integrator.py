@@ -2,10 +2,9 @@
 
 import casadi as ca
 
-from models._numbers import at_least
 from models.textbook.ends import ends_at
 from models.textbook.mass import mass
-from ocp import OCP, Box, FreeTime, Model, ProblemError
+from ocp import OCP, Box, FreeTime, Model, positive, whole
 
 
 def double_integrator_energy() -> OCP:
@@ -149,14 +148,13 @@ def discrete_double_integrator(steps: int, dt: float) -> OCP:
     Raises:
         ProblemError: if one of them is not.
     """
-    if steps != int(steps) or steps < 1:
-        raise ProblemError(f"discrete double integrator: steps = {steps!r}, it must be 1 or more")
-    model = mass(at_least(dt, 0.0, "discrete double integrator: dt", strictly=True))
+    whole(steps, "discrete double integrator: steps")
+    model = mass(positive(dt, "discrete double integrator: dt"))
     return OCP(
         name="discrete double integrator",
         model=model,
         x0=[1.0, 0.0],
-        horizon=int(steps),
+        horizon=steps,
         running_cost=ca.sumsqr(model.x) + model.u**2,
         terminal_cost=ca.sumsqr(model.x),
     )

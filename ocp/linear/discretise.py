@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance
+from ocp.expressions import instance, positive
 from ocp.linear.structure import Terms, read_terms
 from ocp.model import Model
 from ocp.parameters import Parameter, Signal
@@ -44,8 +44,7 @@ def discretise(ocp: OCP, dt: float) -> OCP:
         raise ProblemError(f"{ocp.name}: the model is discrete already")
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: a free final time has no number of steps")
-    if not 0.0 < dt < np.inf:
-        raise ProblemError(f"{ocp.name}: dt = {dt} s, it must be positive, finite")
+    positive(dt, f"{ocp.name}: dt [s]")
     steps = _whole(ocp.duration / dt, f"{ocp.name}: the horizon of {ocp.duration:g} s", dt)
     terms = read_terms(ocp)
     _refuse_time(ocp, terms)

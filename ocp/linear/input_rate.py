@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Box, Constraint
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import numbers
+from ocp.expressions import instance, numbers
 from ocp.model import Model
 from ocp.problem import OCP
 
@@ -35,6 +35,8 @@ def with_input_rate(
         UnsupportedProblem: for a continuous model, where the derivative of the control is meant.
         ProblemError: for a negative weight or a wrong size.
     """
+    instance(ocp, OCP, "with_input_rate: the problem")
+    instance(rate, Box, "with_input_rate: rate")
     m = ocp.model
     if not m.is_discrete:
         raise UnsupportedProblem(f"{ocp.name}: a change per step needs a discrete-time model")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ocp.errors import ProblemError
-from ocp.expressions import whole
+from ocp.expressions import function, instance, positive, whole
 from ocp.mpc.decision import Decision
 from ocp.mpc.plot_rollout import COLOURS, labels, refuse_empty
 from ocp.mpc.rollout import Draw, Progress, Rollout
@@ -38,11 +38,12 @@ def animate_rollout(
     progress: Progress | None = None,
 ) -> Path:
     """Write a GIF; see ``Rollout.animate``."""
+    instance(path, (str, Path), "the path of an animation")
     path, times = Path(path), _times(rollout, frames_per_second, speed)
     if path.suffix != ".gif":
         raise ProblemError(f"animation: {path} is no .gif file")
-    if draw is not None and not callable(draw):
-        raise ProblemError(f"animation: draw = {draw!r} is no function (axes, x, t)")
+    if draw is not None:
+        function(draw, "animation: draw")
     film = _Film.of(rollout, draw)
     film.show(float(times[0]))
     film.figure.draw_without_rendering()
@@ -67,8 +68,7 @@ def _times(rollout: Rollout, frames_per_second: int, speed: float) -> np.ndarray
         raise ProblemError(
             f"animation: {frames_per_second} frames per second, a GIF shows 1 to {_FASTEST}"
         )
-    if not 0.0 < speed < np.inf:
-        raise ProblemError(f"animation: speed = {speed}, it must be positive, finite")
+    positive(speed, "animation: speed")
     first, last = rollout.t[0], rollout.t[-1]
     count = max(2, round((last - first) / speed * frames_per_second) + 1)
     if count > _MOST:

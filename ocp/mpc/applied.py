@@ -9,6 +9,7 @@ import numpy as np
 from ocp.buffered import Buffered
 from ocp.constraint import Box
 from ocp.errors import ProblemError
+from ocp.expressions import instance
 from ocp.problem import OCP
 
 # (x, u, t, p) -> input (m,).
@@ -32,6 +33,8 @@ class Applied:
         """Check the choice."""
         if self.what not in ("control", "rate"):
             raise ProblemError(f"applied: {self.what!r} is neither control nor rate")
+        if self.bounds is not None:
+            instance(self.bounds, Box, "applied: bounds")
         if self.what == "control" and self.bounds is not None:
             raise ProblemError("applied: the bounds of a control are those of the problem")
 

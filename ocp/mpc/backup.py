@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import numbers
+from ocp.expressions import instance, numbers, positive
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import stationary
 from ocp.linear.structure import linear_quadratic
@@ -52,6 +52,7 @@ def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> Feedback:
         UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse, and a matrix that
             depends on time or parameters.
     """
+    instance(ocp, OCP, "saturated_lqr: the problem")
     endless = _endless(ocp, dt)
     lq = linear_quadratic(endless if dt is None else discretise(endless, dt))
     if lq.fixed is None:
@@ -117,8 +118,8 @@ def instantaneous(
         ProblemError: if the reach is not positive, or ``sent`` is neither.
         UnsupportedProblem: what the minimum principle refuses, see ``derive``.
     """
-    if not reach > 0.0:
-        raise ProblemError(f"instantaneous control: reach = {reach} s, it must be positive")
+    instance(ocp, OCP, "instantaneous: the problem")
+    positive(reach, "instantaneous control: reach [s]")
     if sent not in ("control", "rate"):
         raise ProblemError(f"instantaneous control: sent = {sent!r} is neither control nor rate")
     m, control = ocp.model, derive(ocp).control

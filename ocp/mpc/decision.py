@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -87,6 +87,7 @@ class ControlRefused(OCPError, RuntimeError):
         self.attempt = attempt
 
 
+@runtime_checkable
 class Controller(Protocol):
     """Anything that decides an input from a measurement: ``MPC``, ``Law``."""
 

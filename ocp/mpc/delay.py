@@ -1,8 +1,7 @@
 """A delay in sampling intervals."""
 
-import numpy as np
-
 from ocp.errors import ProblemError
+from ocp.expressions import not_negative
 
 
 def late_steps(delay: float, dt: float) -> int:
@@ -11,7 +10,7 @@ def late_steps(delay: float, dt: float) -> int:
     Raises:
         ProblemError: if it is negative or no multiple of the interval.
     """
-    steps = round(delay / dt) if np.isfinite(delay) else -1
-    if steps < 0 or abs(steps * dt - delay) > 1e-9 * dt:
+    steps = round(not_negative(delay, "delay [s]") / dt)
+    if abs(steps * dt - delay) > 1e-9 * dt:
         raise ProblemError(f"delay = {delay} s is no multiple of the sampling interval of {dt} s")
     return steps

@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance, numbers, positive
+from ocp.expressions import function, instance, not_negative, numbers, numeric, positive, real
 from ocp.mpc.applied import Applied
 from ocp.mpc.asking import INSIDE
 from ocp.mpc.decision import Attempt, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.fallback import Backup, Choice, backup_of
-from ocp.mpc.ladder import Ladder, Moment
+from ocp.mpc.ladder import Ladder
 from ocp.mpc.loop import Watch, closed_loop
 from ocp.mpc.memory import Memory
+from ocp.mpc.moment import Moment
 from ocp.mpc.plant import Plant
 from ocp.mpc.rollout import Rollout
 from ocp.parameters import ParameterValues
@@ -125,6 +126,9 @@ class MPC:
         instance(self.ocp, OCP, "MPC: ocp")
         instance(self.solver, Solver, "MPC: solver")
         instance(self.applied, Applied, "MPC: applied")
+        if self.parameters is not None:
+            function(self.parameters, "MPC: parameters")
+        self.ocp.first_guess(self.guess)
         name, model, dt = self.ocp.name, self.ocp.model, self.dt
         if self.ocp.has_free_time:
             raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
@@ -139,8 +143,7 @@ class MPC:
             )
         if self.budget is not None:
             positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
-        if not self.tolerance >= 0.0:
-            raise ProblemError(f"MPC of {name}: tolerance = {self.tolerance} is negative")
+        not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
 
     @property
     def _prepared(self) -> Solver:
@@ -238,6 +241,7 @@ class MPC:
         Raises:
             ProblemError: if states or inputs of plant and problem differ in number.
         """
+        instance(plant, Plant, f"MPC of {self.ocp.name}: plant")
         for what, ours, theirs in (
             ("states", self.ocp.model.nx, plant.ocp.model.nx),
             ("inputs", self.applied.size(self.ocp), plant.ocp.model.nu),
@@ -256,11 +260,11 @@ class MPC:
 
     def _moment(self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None) -> Moment:
         """Collect what a decision is made from."""
-        state, plan, at = np.array(x, dtype=float), self.memory.plan, t + self.delay
-        if state.shape != (self.ocp.model.nx,) or not isfinite(t):
+        name, plan = self.ocp.name, self.memory.plan
+        at, state = real(t, f"MPC of {name}: t [s]") + self.delay, numeric(x, f"MPC of {name}: x")
+        if state.shape != (self.ocp.model.nx,):
             raise ProblemError(
-                f"MPC of {self.ocp.name}: x has shape {state.shape} at t = {t}; "
-                f"({self.ocp.model.nx},) and a finite time are needed"
+                f"MPC of {name}: x has shape {state.shape}, ({self.ocp.model.nx},) is needed"
             )
         values, why = self._informed(at, parameters)
         since = plan.t[0] if why and plan else at

@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ocp.constraint import Box
+from ocp.expressions import function, instance, not_negative
 from ocp.mpc.asking import Rule, asked
 from ocp.mpc.decision import ControlRefused, Decision, Outcome
 from ocp.mpc.shift import controls
@@ -28,9 +29,16 @@ class Law:
     bounds: Box = field(default_factory=Box)
     delay: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Check what is given."""
+        function(self.law, "law: law")
+        instance(self.bounds, Box, "law: bounds")
+        not_negative(self.delay, "law: delay [s]")
+
     @classmethod
     def following(cls, plan: Solution) -> "Law":
         """Return the law that feeds a plan forward, whatever the state; its last input is held."""
+        instance(plan, Solution, "law: the plan to follow")
         return cls(law=lambda x, t: controls(plan, t))
 
     def reset(self, acting: np.ndarray | None = None) -> None:

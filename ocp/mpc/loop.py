@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Constraint
 from ocp.errors import ProblemError
-from ocp.expressions import instance, numbers
+from ocp.expressions import function, instance, numbers, positive, whole
 from ocp.mpc.decision import Controller, ControlRefused, Decision
 from ocp.mpc.delay import late_steps
 from ocp.mpc.plant import Plant, RunningPlant
@@ -57,9 +57,14 @@ def closed_loop(
         ProblemError: if the plant takes another input than the controller sends, the duration is
             no multiple of dt, or a function of the plant returns what does not fit.
     """
+    instance(controller, Controller, "closed loop: controller")
     instance(plant, Plant, "closed loop: plant")
-    if not (0.0 < dt < np.inf and np.isfinite(duration)):
-        raise ProblemError(f"closed loop: {duration} s in steps of dt = {dt} s is no run")
+    for fault, what in ((sensors, "sensors"), (watch, "watch")):
+        if fault is not None:
+            function(fault, f"closed loop: {what}")
+    positive(dt, "closed loop: dt [s]")
+    positive(duration, "closed loop: duration [s]")
+    whole(seed, "closed loop: seed", least=0)
     steps = round(duration / dt)
     if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
         raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.constraint import Box
 from ocp.errors import ProblemError
-from ocp.expressions import instance, numbers, whole
+from ocp.expressions import function, instance, not_negative, numbers, whole
 from ocp.mpc.rehearsal import Rehearsal
 from ocp.problem import OCP
 
@@ -52,20 +52,17 @@ class Plant:
     def __post_init__(self) -> None:
         """Check the numbers."""
         instance(self.ocp, OCP, "plant: ocp")
-        instance(self.saturation, Box, "plant: saturation")
-        for name in ("disturbance", "parameters"):
-            given = getattr(self, name)
-            if given is not None and not callable(given):
-                raise ProblemError(f"plant: {name} = {given!r}, a function of t is needed")
         whole(self.substeps, "plant: substeps")
+        for name in ("disturbance", "parameters"):
+            if getattr(self, name) is not None:
+                function(getattr(self, name), f"plant: {name}")
         nx, nu = self.ocp.model.nx, self.ocp.model.nu
         for name in ("process_noise", "measurement_noise"):
             object.__setattr__(self, name, numbers(getattr(self, name), nx, f"plant: {name}"))
+        instance(self.saturation, Box, "plant: saturation")
         object.__setattr__(self, "saturation", self.saturation.sized(nu, "plant: saturation"))
-        if not 0.0 <= self.lag < np.inf:
-            raise ProblemError(f"plant: lag = {self.lag} s, it must not be negative")
-        if not 0.0 <= self.jitter < 1.0:
-            raise ProblemError(f"plant: jitter = {self.jitter}, it is a share in [0, 1)")
+        not_negative(self.lag, "plant: lag [s]")
+        not_negative(self.jitter, "plant: jitter", below=1.0)
 
     def started(self, x0: ArrayLike, seed: int = 0) -> "RunningPlant":
         """Return the plant at rest in a state (nx,) at t = 0."""

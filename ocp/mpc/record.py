@@ -8,6 +8,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from ocp.archive import opened
 from ocp.errors import ProblemError
 from ocp.mpc.decision import Attempt, Decision, Outcome
 from ocp.solution import ControlKind, Solution
@@ -160,7 +161,7 @@ def records(path: str | Path) -> Iterator[Record]:
     Raises:
         ProblemError: if it is no flight record.
     """
-    with Path(path).open("rb") as file:
+    with opened(path, "rb", "flight record") as file:
         names = read_header(file, path)["parameters"]
         while (head := file.read(_HEAD.size)) and len(head) == _HEAD.size:
             body = file.read(_HEAD.unpack(head)[0])

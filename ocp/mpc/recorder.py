@@ -8,7 +8,9 @@ from typing import BinaryIO, Self
 
 import numpy as np
 
+from ocp.archive import opened
 from ocp.errors import ProblemError
+from ocp.expressions import instance
 from ocp.mpc.decision import ControlRefused, Decision
 from ocp.mpc.driver import MPC
 from ocp.mpc.record import Record, header, packed, read_header, records
@@ -26,13 +28,18 @@ class FlightRecorder:
     Args:
         mpc: whose steps are recorded.
         path: the file, overwritten.
+
+    Raises:
+        ProblemError: if the file cannot be written.
     """
 
     def __init__(self, mpc: MPC, path: str | Path) -> None:
         """Open the file."""
+        instance(mpc, MPC, "flight recorder: mpc")
+        instance(path, (str, Path), "the path of a flight record")
         self._mpc, self.path = mpc, Path(path)
         self._last: Solution | None = None
-        self._file: BinaryIO = self.path.open("wb")
+        self._file: BinaryIO = opened(path, "wb", "flight record")
         self._begun, self._t = False, -np.inf
 
     def __enter__(self) -> Self:
@@ -116,7 +123,8 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
     Raises:
         ProblemError: if the file is not of this problem and solver, or ends before a step.
     """
-    with Path(path).open("rb") as file:
+    instance(mpc, MPC, "replay: mpc")
+    with opened(path, "rb", "flight record") as file:
         said = read_header(file, path)
     for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
         if said[name] != own:

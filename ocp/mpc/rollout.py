@@ -156,7 +156,7 @@ class Rollout:
             "plant": self.plant.name,
         }
         content |= probe_entries(self.plant)
-        return write_archive(path, content)
+        return write_archive(path, "rollout", content)
 
     @classmethod
     def load(cls, path: str | Path, plant: OCP) -> "Rollout":

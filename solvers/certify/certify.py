@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import ProblemError, Solution, Status, UnsupportedProblem, instance, whole
+from ocp import Solution, Status, UnsupportedProblem, instance, positive, whole
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.certificate import (
     AGREEMENT,
@@ -74,8 +74,7 @@ class Effort:
         whole(self.intervals, "certify: intervals")
         whole(self.starts, "certify: starts")
         whole(self.seed, "certify: seed", least=0)
-        if not self.seconds > 0.0:
-            raise ProblemError(f"certify: seconds = {self.seconds}, they must be positive")
+        positive(self.seconds, "certify: seconds", finite=False)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     Data,
-    ProblemError,
     Program,
     Solution,
     Solver,
@@ -19,6 +18,7 @@ from ocp import (
     UnsupportedProblem,
     elevated,
     instance,
+    positive,
 )
 from solvers.collocation.costates import costates
 from solvers.collocation.gaps import Gaps
@@ -79,8 +79,7 @@ class Collocation(Solver):
         if self.mesh is not None:
             instance(self.mesh, Mesh, "collocation: mesh")
         self.chosen_mesh  # noqa: B018 - checks its own
-        if not self.accuracy > 0.0:
-            raise ProblemError(f"the accuracy must be positive, not {self.accuracy}")
+        positive(self.accuracy, "collocation: accuracy", finite=False)
         self.options  # noqa: B018 - checks its own
 
     @property
@@ -104,6 +103,7 @@ class Collocation(Solver):
         Raises:
             UnsupportedProblem: for a discrete-time model, which has nothing to collocate.
         """
+        instance(ocp, OCP, "collocation: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import ProblemError, whole
+from ocp import ProblemError, instance, real, whole
 from solvers.collocation.points import Family, Points
 
 
@@ -26,7 +26,10 @@ class Mesh:
 
     def __post_init__(self) -> None:
         """Check both, and keep them as tuples."""
-        edges, degrees = tuple(map(float, self.edges)), tuple(self.degrees)
+        instance(self.edges, (tuple, list, np.ndarray), "mesh: edges")
+        instance(self.degrees, (tuple, list, np.ndarray), "mesh: degrees")
+        edges = tuple(real(edge, "mesh: edge") for edge in self.edges)
+        degrees = tuple(self.degrees)
         if len(edges) < 2 or edges[0] != 0.0 or edges[-1] != 1.0 or not min(np.diff(edges)) > 0.0:
             raise ProblemError("mesh: the edges must increase from 0 to 1")
         if len(degrees) != len(edges) - 1:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import (
@@ -17,6 +16,7 @@ from ocp import (
     Start,
     UnsupportedProblem,
     instance,
+    positive,
     whole,
 )
 from solvers.constrained.ascent import Ascent
@@ -79,15 +79,17 @@ class AugmentedLagrangian(Solver):
         instance(self.inner, Solver, "augmented Lagrangian: inner")
         whole(self.intervals, "augmented Lagrangian: intervals")
         whole(self.max_iterations, "augmented Lagrangian: max_iterations")
-        if not 0.0 < self.penalty <= self.largest_penalty < np.inf:
+        for name in ("penalty", "largest_penalty", "growth"):
+            positive(getattr(self, name), f"augmented Lagrangian: {name}")
+        if self.penalty > self.largest_penalty:
             raise ProblemError(
-                f"augmented Lagrangian: 0 < penalty <= largest_penalty is needed, not "
+                f"augmented Lagrangian: penalty <= largest_penalty is needed, not "
                 f"{self.penalty}, {self.largest_penalty}"
             )
         if not self.growth > 1.0:
             raise ProblemError(f"augmented Lagrangian: growth = {self.growth}, it must exceed 1")
-        if not (self.tolerance > 0.0 and self.complementarity > 0.0):
-            raise ProblemError("augmented Lagrangian: the tolerances must be positive")
+        for name in ("tolerance", "complementarity"):
+            positive(getattr(self, name), f"augmented Lagrangian: {name}", finite=False)
 
     def build(self, ocp: OCP) -> "AugmentedLagrangianProgram":
         """Relax the problem and let the inner solver build that.
@@ -96,6 +98,7 @@ class AugmentedLagrangian(Solver):
             UnsupportedProblem: if there is nothing to relax, in discrete time, or from the inner
                 solver.
         """
+        instance(ocp, OCP, "augmented Lagrangian: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "

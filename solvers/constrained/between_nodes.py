@@ -13,7 +13,6 @@ from ocp import (
     OCP,
     Box,
     Constraint,
-    ProblemError,
     Program,
     Signal,
     Solution,
@@ -23,6 +22,7 @@ from ocp import (
     UnsupportedProblem,
     evaluate,
     instance,
+    positive,
     whole,
 )
 from solvers.constrained.rows import Rows
@@ -61,8 +61,7 @@ class BetweenNodes(Solver):
         """Check the options."""
         instance(self.inner, MultipleShooting, "between nodes: inner")
         whole(self.max_rounds, "between nodes: max_rounds")
-        if not self.tolerance > 0.0:
-            raise ProblemError(f"between nodes: tolerance = {self.tolerance}, not positive")
+        positive(self.tolerance, "between nodes: tolerance", finite=False)
 
     def build(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.
@@ -70,6 +69,7 @@ class BetweenNodes(Solver):
         Raises:
             UnsupportedProblem: in discrete time, where nothing lies between the nodes.
         """
+        instance(ocp, OCP, "between nodes: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "

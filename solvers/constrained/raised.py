@@ -15,6 +15,7 @@ from ocp import (
     Work,
     evaluate,
     instance,
+    positive,
     whole,
 )
 
@@ -57,15 +58,17 @@ def raise_until_clear(
     Raises:
         ProblemError: if the problems do not fit, or the parameter is none or not positive.
     """
+    instance(soft, OCP, "raise until clear: soft")
+    instance(hard, OCP, "raise until clear: hard")
     instance(solver, Solver, "raise until clear: solver")
     whole(most, "raise until clear: most")
     price = _first_price(soft, parameter)
     if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
         raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
-    if not (tolerance > 0.0 and (price > 0.0).all()):
+    positive(tolerance, "raise until clear: tolerance")
+    if not (price > 0.0).all():
         raise ProblemError(
-            f"raise until clear: tolerance = {tolerance} and '{parameter}' = {price} must be "
-            "positive, or nothing can be raised until anything is clear"
+            f"raise until clear: '{parameter}' = {price}, it must be positive to be raised"
         )
     program = solver.build(soft)
     runs: list[Solution] = []

@@ -45,6 +45,7 @@ class Apart:
     def __init__(self, function: ca.Function, seconds: float, *, verbose: bool = False) -> None:
         """Start the process."""
         self.function, self.seconds, self.verbose = function, seconds, verbose
+        self._lock = Lock()
         self._start()
 
     def __call__(self, inputs: Inputs) -> tuple[Outputs, dict[str, Any]]:
@@ -54,10 +55,18 @@ class Apart:
             RuntimeError: where the Function does.
             Lost: if the call took too long, or its process ended by itself.
         """
-        if self._owner != os.getpid():  # after a fork the process is still the other one's
-            self._start()
         with self._lock:
-            answer = self._asked(inputs)
+            # A fork's process is still the other one's; an answer that nobody took, since the
+            # process died or the call was interrupted, would be taken for that of this call.
+            if self._owner != os.getpid() or self._is_asked:
+                self._start()
+            self._is_asked = True
+            try:
+                self._pipe.send(inputs)
+                answer = self._pipe.recv()
+            except (EOFError, ConnectionError):
+                raise Lost("ended with its process") from None
+            self._is_asked = False
         if answer is None:
             raise RuntimeError("the Function threw an exception")
         if answer == signal.SIGALRM.name:
@@ -65,17 +74,6 @@ class Apart:
         if isinstance(answer, str):
             raise Lost(f"was ended by {answer}")
         return answer
-
-    def _asked(self, inputs: Inputs) -> Any:
-        try:
-            self._pipe.send(inputs)
-            return self._pipe.recv()
-        except (EOFError, ConnectionError):
-            self._start()
-            raise Lost("ended with its process") from None
-        except BaseException:  # interrupted: the answer would be taken for that of the next call
-            self._start()
-            raise
 
     def _start(self) -> None:
         """Start a process, in place of the last one if there is one."""
@@ -96,7 +94,7 @@ class Apart:
                 # Ctrl-C is for this process; and all of that session can be ended at once.
                 start_new_session=True,
             )
-        self.process, self._owner, self._lock = process.pid, os.getpid(), Lock()
+        self.process, self._owner, self._is_asked = process.pid, os.getpid(), False
         self._end = finalize(self, _end, process, self._pipe, self._owner)
         self._pipe.send((self.function, self.seconds))
 

@@ -3,7 +3,7 @@
 import casadi as ca
 
 from ocp import OCP, Box, Integrator, Stage, compiled, curvature
-from solvers.direct.riccati_sweep import backwards, clipped, follow, forwards, units
+from solvers.direct.riccati_sweep import backwards, follow, forwards, units
 
 
 def _symbols(ocp: OCP, n: int) -> dict[str, ca.MX]:
@@ -127,7 +127,7 @@ def _room(u: ca.MX, slope: ca.MX, size: ca.MX, bounds: Box) -> ca.MX:
     """
     one, step = (ca.SX.sym(name, u.shape[0]) for name in ("u", "step"))
     unit = units(bounds)
-    room = (one - clipped(one - unit * step, bounds)) / unit
+    room = (one - bounds.clip_expression(one - unit * step)) / unit
     nearest = ca.Function("room", [one, step], [room]).map(u.shape[1])
     return size * nearest(u, ca.diag(unit) @ slope / size)
 

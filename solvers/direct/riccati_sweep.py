@@ -93,7 +93,7 @@ def follow(step: ca.Function, bounds: Box) -> ca.Function:
     law = ca.SX.sym("law", nu + nx, nx + 1)
     x, u, costate = ca.SX.sym("x", nx), ca.SX.sym("u", nu), ca.SX.sym("costate", nx)
     moves = law @ ca.vertcat(y - x, share)
-    control = clipped(u + moves[:nu], bounds)
+    control: ca.SX = bounds.clip_expression(u + moves[:nu])
     rest: list = [ca.SX.sym(step.name_in(i), step.size_in(i)) for i in range(2, 6)]
     after, _ = step.call([y, control, *rest])
     inputs = [y, share, law, gap, x, u, costate, *rest]
@@ -119,16 +119,6 @@ def _solved(matrix: ca.SX, right: ca.SX) -> tuple[ca.SX, ca.SX]:
         solution[i] = (work[i, size:] - known) / work[i, i]
     pivots = ca.diag(work[:, :size]) / (ca.fabs(ca.diag(matrix)) + _TINY)
     return ca.vertcat(*solution), pivots
-
-
-def clipped(u: ca.SX, bounds: Box) -> ca.SX:
-    """Return the nearest controls within their bounds."""
-    lower, upper = np.asarray(bounds.lower), np.asarray(bounds.upper)
-    rows = [
-        ca.fmax(v, b) if np.isfinite(b) else v for v, b in zip(ca.vertsplit(u), lower, strict=True)
-    ]
-    rows = [ca.fmin(v, b) if np.isfinite(b) else v for v, b in zip(rows, upper, strict=True)]
-    return ca.vertcat(*rows)
 
 
 def units(bounds: Box) -> np.ndarray:

@@ -81,6 +81,7 @@ class StagewiseNewton(Solver):
 
     def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
+        instance(ocp, OCP, "stagewise Newton: the problem")
         _refuse(ocp)
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ocp import ProblemError
+from ocp import positive, whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,7 @@ class FixedStep:
 
     def __post_init__(self) -> None:
         """Check the step."""
-        if not self.alpha > 0.0:
-            raise ProblemError(f"the step alpha must be positive, not {self.alpha}")
+        positive(self.alpha, "fixed step: alpha")
 
     def advance(
         self, probe: Probe, cost: float, slope: float, first: float
@@ -84,8 +83,8 @@ class Armijo:
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        if not 0.0 < self.decrease < 0.5 or self.most < 1:
-            raise ProblemError("Armijo needs 0 < decrease < 1/2 and at least one trial")
+        positive(self.decrease, "Armijo: decrease", below=0.5)
+        whole(self.most, "Armijo: most")
 
     def advance(
         self, probe: Probe, cost: float, slope: float, first: float

@@ -23,6 +23,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     instance,
+    not_negative,
     whole,
 )
 from solvers.gradient.direction import Direction, Move, search_direction
@@ -72,8 +73,8 @@ class Schuetz(Solver):
         whole(self.max_iterations, "Schuetz: max_iterations")
         instance(self.integrator, Integrator, "Schuetz: integrator")
         instance(self.step, (FixedStep, Armijo), "Schuetz: step")
-        if self.decrease < 0.0 or self.stationarity < 0.0:
-            raise ProblemError("Schuetz: decrease and stationarity must not be negative")
+        for name in ("decrease", "stationarity"):
+            not_negative(getattr(self, name), f"Schuetz: {name}", finite=False)
         if self.direction not in get_args(Direction):
             raise ProblemError(f"direction = {self.direction!r} is not known")
         if self.gradient not in ("continuous", "discrete"):
@@ -94,6 +95,7 @@ class Schuetz(Solver):
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""
+        instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
         exact = self.gradient == "discrete"
         sweeps = Sweeps.of(ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled)

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import OCP, Data, ParameterValues, ProblemError, UnsupportedProblem
+from ocp import (
+    OCP,
+    Data,
+    ParameterValues,
+    ProblemError,
+    UnsupportedProblem,
+    instance,
+    not_negative,
+    positive,
+)
 from solvers.indirect.newton import NewtonResult
 
 _SMALLEST_ADVANCE = 1e-3
@@ -24,8 +33,7 @@ class HorizonContinuation:
 
     def __post_init__(self) -> None:
         """Check the share."""
-        if not 0.0 < self.first < 1.0:
-            raise ProblemError(f"continuation: first = {self.first}, it must lie in (0, 1)")
+        positive(self.first, "continuation: first", below=1.0)
 
     def check(self, ocp: OCP) -> None:
         """Refuse a free final time: the optimiser, not the share, then sets the horizon."""
@@ -55,8 +63,8 @@ class ParameterContinuation:
 
     def __post_init__(self) -> None:
         """Check the share."""
-        if not 0.0 <= self.first < 1.0:
-            raise ProblemError(f"continuation: first = {self.first}, it must lie in [0, 1)")
+        instance(self.name, str, "continuation: name")
+        not_negative(self.first, "continuation: first", below=1.0)
 
     def check(self, ocp: OCP) -> None:
         """Refuse a name that the problem does not know, and a value that does not fit."""

@@ -17,6 +17,8 @@ from ocp import (
     UnsupportedProblem,
     Work,
     evaluate,
+    instance,
+    positive,
     whole,
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot
@@ -106,11 +108,11 @@ def enumerate_extremals(
             constraints, and a free final time.
         ProblemError: if the target is out of reach, or the start is not on the manifold.
     """
+    instance(ocp, OCP, "enumerate_extremals: the problem")
     whole(points, "enumerate_extremals: points")
     if keep is not None:
         whole(keep, "enumerate_extremals: keep")
-    if not 0.0 < gap < np.inf:
-        raise ProblemError(f"enumerate_extremals: gap = {gap}, it must be positive, finite")
+    positive(gap, "enumerate_extremals: gap")
     _refuse(ocp)
     kept = Kept.of(ocp)
     redundant_by_one(kept)

@@ -8,7 +8,7 @@ from scipy import sparse
 
 from ocp import OCP, Buffered, Integrator, Optimality, compiled, derive
 from solvers.indirect.canonical import canonical_step, end_conditions, start_conditions
-from solvers.indirect.newton_system import assembled
+from solvers.indirect.newton_system import block_matrix
 from solvers.indirect.segments import Paths, Schedule, Shape
 
 
@@ -133,7 +133,7 @@ class Extremals:
             blocks[k + 1][s + 2] = in_time[k][:, None]
         blocks[s][s - 1], blocks[s][s + 1] = end_z @ in_z[-1], end_nu
         blocks[s][s + 2] = end_z @ in_time[-1][:, None] + end_t
-        return assembled(blocks if self.shape.free_time else [row[:-1] for row in blocks])
+        return block_matrix(blocks if self.shape.free_time else [row[:-1] for row in blocks])
 
     def trajectory(
         self, paths: Paths, schedule: Schedule, duration: float

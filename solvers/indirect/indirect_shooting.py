@@ -91,6 +91,7 @@ class IndirectShooting(Solver):
 
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""
+        instance(ocp, OCP, "indirect shooting: the problem")
         for c in ocp.at("path"):
             raise UnsupportedProblem(
                 f"{ocp.name}: indirect shooting takes no path constraint ('{c.name}')"

@@ -7,8 +7,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 
-def assembled(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
-    """Return a matrix of blocks; None is a block of zeros.
+def block_matrix(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
+    """Return the sparse matrix of some blocks; None is a block of zeros.
 
     Args:
         rows: blocks (m, n) side by side; a column of None alone has no width.

@@ -23,6 +23,7 @@ from ocp import (
     UnsupportedProblem,
     Work,
     instance,
+    positive,
     whole,
 )
 from solvers.indirect.boundary import refuse_what_reverse_cannot, transversality
@@ -87,11 +88,11 @@ class ReverseShooting(Solver):
                 f"reverse shooting: boundary = {self.boundary!r}, it is 2, 3 or 4 (type 1 is "
                 "IndirectShooting)"
             )
-        if not self.tolerance > 0.0:
-            raise ProblemError("reverse shooting needs a positive tolerance")
+        positive(self.tolerance, "reverse shooting: tolerance", finite=False)
 
     def build(self, ocp: OCP) -> "ReverseShootingProgram":
         """Derive the canonical flow and the conditions at both ends."""
+        instance(ocp, OCP, "reverse shooting: the problem")
         refuse_what_reverse_cannot(ocp)
         if self.boundary == 4 and ocp.has_free_start:
             raise UnsupportedProblem(

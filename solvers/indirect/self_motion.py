@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ocp import ProblemError, UnsupportedProblem
+from ocp import ProblemError, UnsupportedProblem, instance, positive, whole
 from solvers.indirect.manifold import Manifold, out_of_reach, redundant_by_one
 
 # Largest turn of the tangent in one step [rad].
@@ -70,6 +70,8 @@ def self_motions(
         UnsupportedProblem: if the redundancy is not one, or a curve does not close.
         ProblemError: if no seed reaches the manifold: the target is out of reach.
     """
+    instance(manifold, Manifold, "self_motions: manifold")
+    positive(step, "self_motions: step")
     redundant_by_one(manifold)
     rows, arrived = manifold.projected(np.asarray(seeds, dtype=float))
     if not arrived.any():
@@ -89,6 +91,8 @@ def seeds_around(manifold: Manifold, x: np.ndarray, count: int = SEEDS) -> np.nd
         x: the configuration (nx,), the first row of the answer.
         count: rows of the answer (count, nx); always the same for the same x.
     """
+    instance(manifold, Manifold, "seeds_around: manifold")
+    whole(count, "seeds_around: count")
     rng, finite = np.random.default_rng(0), np.isfinite(manifold.periods.of_states)
     width = np.where(finite, np.where(finite, manifold.periods.of_states, 0.0) / 2.0, 1.0 + abs(x))
     return np.vstack([x, x + rng.uniform(-1.0, 1.0, (count - 1, len(x))) * width])

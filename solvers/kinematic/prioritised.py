@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, instance
+from ocp import ProblemError, instance, positive
 from solvers.kinematic.program import KinematicProgram, refuse_dependent
 from solvers.kinematic.pseudo_inverse import Filtered, Inverse
 from solvers.kinematic.task import Task
@@ -43,7 +43,7 @@ class PrioritisedKinematics:
 
     def __post_init__(self) -> None:
         """Check the tasks against each other."""
-        if isinstance(self.tasks, Task) or not self.tasks:
+        if not isinstance(self.tasks, tuple | list) or not self.tasks:
             raise ProblemError("kinematics: tasks must be a tuple of at least one Task")
         tasks = tuple(self.tasks)
         for i, task in enumerate(tasks):
@@ -62,8 +62,7 @@ class PrioritisedKinematics:
         for i, inverse in enumerate(self.inverses):
             instance(inverse, Inverse, f"kinematics: damping[{i}]")
         for name in ("speed_limit", "tolerance"):
-            if not getattr(self, name) > 0.0:
-                raise ProblemError(f"kinematics: {name} = {getattr(self, name)}, it must be > 0")
+            positive(getattr(self, name), f"kinematics: {name}", finite=False)
         _refuse_used_up(tasks)
         object.__setattr__(self, "tasks", tasks)
 

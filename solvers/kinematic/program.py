@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError, SolverError, Status
+from ocp import ProblemError, SolverError, Status, positive
 from solvers.kinematic.hierarchy import Level, prioritised_velocity
 from solvers.kinematic.pseudo_inverse import Inverse
 from solvers.kinematic.run import KinematicRun
@@ -92,9 +92,8 @@ class KinematicProgram:
         Raises:
             ProblemError: on numbers that are not positive or do not fit.
         """
-        for value, what in ((duration, "duration"), (dt, "dt")):
-            if not 0.0 < value < np.inf:
-                raise ProblemError(f"kinematics: {what} = {value} s, it must be positive, finite")
+        positive(duration, "kinematics: duration [s]")
+        positive(dt, "kinematics: dt [s]")
         steps = max(1, round(duration / dt))
         t = t0 + duration * np.arange(steps + 1) / steps
         rows, velocities, message = [self._checked(q0)], [], ""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ocp import ProblemError
+from ocp import positive
 
 
 class Inverse(ABC):
@@ -28,7 +28,7 @@ class Exact(Inverse):
 
     def __post_init__(self) -> None:
         """Check the number."""
-        _positive(self.tolerance, "Exact: tolerance")
+        positive(self.tolerance, "Exact: tolerance")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return 1/s, or 0."""
@@ -50,7 +50,7 @@ class Damped(Inverse):
 
     def __post_init__(self) -> None:
         """Check the number."""
-        _positive(self.factor, "Damped: factor")
+        positive(self.factor, "Damped: factor")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return s/(s² + λ²)."""
@@ -78,15 +78,10 @@ class Filtered(Inverse):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        _positive(self.factor, "Filtered: factor")
-        _positive(self.threshold, "Filtered: threshold")
+        positive(self.factor, "Filtered: factor")
+        positive(self.threshold, "Filtered: threshold")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return s/(s² + λ²(s))."""
         share = np.minimum(1.0, singular_values / self.threshold)
         return singular_values / (singular_values**2 + self.factor**2 * (1.0 - share**2))
-
-
-def _positive(value: float, what: str) -> None:
-    if not isinstance(value, int | float | np.number) or not 0.0 < value < np.inf:
-        raise ProblemError(f"{what} = {value!r}, a positive number is needed")

@@ -49,9 +49,7 @@ class Task:
 
     def __post_init__(self) -> None:
         """Check shapes and symbols."""
-        for symbols, what in ((self.q, "q"), (self.t, "t")):
-            if not isinstance(symbols, ca.SX) or not symbols.is_valid_input():
-                raise ProblemError(f"task '{self.name}': {what} is no column of SX symbols")
+        _require_symbols(self.name, self.q, self.t)
         for part in ("value", "rate", "error", "activation"):
             what = f"task '{self.name}': {part}"
             expression = as_column(getattr(self, part), what)
@@ -126,6 +124,7 @@ def track(
     Raises:
         ProblemError: on shapes that do not fit or a gain that is not finite or negative.
     """
+    _require_symbols(name, q, t)
     r, target = as_column(value, f"task '{name}': value"), as_column(desired, f"task '{name}'")
     if r.numel() != target.numel():
         raise ProblemError(f"task '{name}': {r.numel()} values, {target.numel()} desired ones")
@@ -157,11 +156,18 @@ def descend(name: str, *, q: ca.SX, t: ca.SX, potential: ca.SX, gain: float) -> 
     Raises:
         ProblemError: on a potential that is no scalar, or a bad gain.
     """
+    _require_symbols(name, q, t)
     slope = as_column(potential, f"task '{name}': potential")
     if slope.numel() != 1:
         raise ProblemError(f"task '{name}': potential has {slope.numel()} entries, 1 is needed")
     k = float(_gain(gain, 1, name)[0, 0])
     return Task(name=name, q=q, t=t, value=q, rate=-k * ca.gradient(slope, q), yields=True)
+
+
+def _require_symbols(name: str, q: ca.SX, t: ca.SX) -> None:
+    for symbols, what in ((q, "q"), (t, "t")):
+        if not isinstance(symbols, ca.SX) or not symbols.is_valid_input():
+            raise ProblemError(f"task '{name}': {what} is no column of SX symbols")
 
 
 def as_column(expression: Expression, what: str) -> ca.SX:

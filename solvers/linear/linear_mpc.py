@@ -20,8 +20,8 @@ from ocp import (
     Solver,
     Start,
     Status,
-    instance,
     linear_quadratic,
+    positive,
     start_fault,
 )
 from solvers.linear import recursion
@@ -72,13 +72,9 @@ class LinearMPC(Solver):
         """Check the options."""
         if self.form not in _FORMS:
             raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
-        number = (int, float, np.integer, np.floating)
-        instance(self.tolerance, number, "LinearMPC: tolerance")
-        instance(self.soft, (*number, type(None)), "LinearMPC: soft")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ProblemError(f"LinearMPC: tolerance = {self.tolerance}, it must be in (0, 1)")
-        if self.soft is not None and not 0.0 < self.soft < np.inf:
-            raise ProblemError(f"LinearMPC: soft = {self.soft}, the price must be positive")
+        positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
+        if self.soft is not None:
+            positive(self.soft, "LinearMPC: soft")
 
     def build(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from ocp import ProblemError
 from solvers.predictive.diophantine import Split, added, delayed, diophantine
 
 
+@runtime_checkable
 class CarimaModel(Protocol):
     """The polynomials of thesis (2.56), by rising delay, and the dead time [steps]."""
 

@@ -7,14 +7,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from ocp import Box, ProblemError, Status, instance
+from ocp import Box, ProblemError, Status, instance, not_negative, positive
 from solvers.linear.elastic import least_violation
 from solvers.linear.qp_backends import Backend, qp_backend
 from solvers.linear.quadratic_program import QP
 from solvers.predictive.carima_prediction import CarimaModel, Prediction, history
 from solvers.predictive.diophantine import added, delayed
 
-_NUMBER = (int, float, np.integer, np.floating)
 # A closed loop with a pole beyond this grows, or does not die out.
 _STABLE = 1.0 - 1e-9
 # A bound that is exceeded by less, relative to 1 + abs(bound), is met.
@@ -67,13 +66,10 @@ class GPC:
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) and not (value is None and name != "n2"):
                 raise ProblemError(f"GPC: {name} = {value!r}, a whole number of steps is needed")
-        for name in ("weight", "tolerance"):
-            instance(getattr(self, name), _NUMBER, f"GPC: {name}")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ProblemError(f"GPC: tolerance = {self.tolerance}, it must be in (0, 1)")
-        if not 0.0 <= self.weight < np.inf:
-            raise ProblemError(f"GPC: weight = {self.weight}, it must be >= 0, finite")
+        positive(self.tolerance, "GPC: tolerance", below=1.0)
+        not_negative(self.weight, "GPC: weight")
         for name in ("increment_bounds", "input_bounds", "output_bounds"):
+            instance(getattr(self, name), Box, f"GPC: {name}")
             object.__setattr__(self, name, getattr(self, name).sized(1, f"GPC: {name}"))
 
     def build(self, model: CarimaModel) -> "GPCLaw":
@@ -86,6 +82,7 @@ class GPC:
             ProblemError: if the horizons do not fit, if the increments are not determined,
                 or if the weight is 0 where the plant's zeros then make the loop unstable.
         """
+        instance(model, CarimaModel, "GPC: model")
         first = model.delay + 1
         n1 = first if self.n1 is None else self.n1
         nu = self.n2 - model.delay if self.nu is None else self.nu

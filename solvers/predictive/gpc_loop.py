@@ -1,16 +1,17 @@
 """A plant under generalised predictive control, with noise and a load."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError, Status
+from ocp import ProblemError, Status, instance, whole
 from solvers.predictive.carima_prediction import history
 from solvers.predictive.gpc import GPCLaw
 
 
+@runtime_checkable
 class Plant(Protocol):
     """Something with one input and one output: ``models.CarimaPlant``."""
 
@@ -75,8 +76,9 @@ def gpc_loop(
     Raises:
         ProblemError: if the reference, the noise or the load is too short.
     """
-    if steps != int(steps) or steps < 1:
-        raise ProblemError(f"GPC loop: steps = {steps!r}, a whole number >= 1 is needed")
+    instance(law, GPCLaw, "GPC loop: law")
+    instance(plant, Plant, "GPC loop: plant")
+    whole(steps, "GPC loop: steps")
     n2 = law.prediction.n2
     w = history(reference, "reference")
     w = np.full(steps + n2, w[0]) if w.size == 1 else w

@@ -14,7 +14,6 @@ from ocp import (
     RK4,
     Data,
     Integrator,
-    ProblemError,
     Program,
     Solution,
     Solver,
@@ -22,6 +21,7 @@ from ocp import (
     Start,
     Status,
     Work,
+    instance,
     positive,
     whole,
 )
@@ -72,12 +72,11 @@ class Greedy(Solver):
         """Check the options."""
         whole(self.intervals, "Greedy: intervals")
         whole(self.max_iterations, "Greedy: max_iterations")
-        positive(self.tolerance, "Greedy: tolerance")
-        if not 0.0 < self.tolerance < 1.0:
-            raise ProblemError(f"Greedy: tolerance = {self.tolerance}, it must be in (0, 1)")
+        positive(self.tolerance, "Greedy: tolerance", below=1.0)
 
     def build(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""
+        instance(ocp, OCP, "Greedy: the problem")
         refuse_free_ends(ocp, "Greedy")
         stage = Stage.of(ocp, self.integrator, held=True)
         n, options = ocp.steps or self.intervals, _options(self)

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ocp import ProblemError
+from ocp import ProblemError, real, whole
 
 # A point outside the grid by less than this part of a cell is on its edge.
 _ROUNDING = 1e-9
@@ -32,12 +32,9 @@ class Axis:
 
     def __post_init__(self) -> None:
         """Check range and number."""
-        if not -np.inf < self.lower < self.upper < np.inf:
-            raise ProblemError(
-                f"axis: finite lower < upper is needed, not {self.lower}, {self.upper}"
-            )
-        if self.points != int(self.points) or self.points < 3:
-            raise ProblemError(f"axis: points = {self.points!r}, a whole number >= 3 is needed")
+        if not real(self.lower, "axis: lower") < real(self.upper, "axis: upper"):
+            raise ProblemError(f"axis: lower < upper is needed, not {self.lower}, {self.upper}")
+        whole(self.points, "axis: points", least=3)
 
     @property
     def values(self) -> np.ndarray:

@@ -21,6 +21,8 @@ from ocp import (
     Status,
     UnsupportedProblem,
     Work,
+    instance,
+    not_negative,
     whole,
 )
 from solvers.tabular.bellman import Bellman, Table
@@ -83,11 +85,11 @@ class GridDP(Solver):
         """Check the options."""
         whole(self.intervals, "GridDP: intervals")
         for name in ("terminal_slack", "accuracy", "memory"):
-            if not getattr(self, name) >= 0.0:
-                raise ProblemError(f"GridDP: {name} = {getattr(self, name)}, it must be >= 0")
+            not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
 
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
+        instance(ocp, OCP, "GridDP: the problem")
         refuse_free_ends(ocp, "GridDP")
         self._refuse_equations(ocp)
         m = ocp.model

@@ -344,8 +344,8 @@ def test_linearly_dependent_tasks(tasks: Any) -> None:
         ({"q0": START[:3], "duration": 1.0}, "4 finite numbers are needed"),
         ({"q0": [np.nan] * 4, "duration": 1.0}, "4 finite numbers"),
         ({"q0": "rest", "duration": 1.0}, "q is not numeric"),
-        ({"q0": START, "duration": 0.0}, "duration = 0.0 s"),
-        ({"q0": START, "duration": 1.0, "dt": -1.0}, "dt = -1.0 s"),
+        ({"q0": START, "duration": 0.0}, r"duration \[s\] = 0.0"),
+        ({"q0": START, "duration": 1.0, "dt": -1.0}, r"dt \[s\] = -1.0"),
     ],
 )
 def test_bad_runs(arguments: dict, message: str) -> None:

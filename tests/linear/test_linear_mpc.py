@@ -267,9 +267,9 @@ def test_residuals_are_those_of_the_program():
     [
         ({"form": "dense"}, "form"),
         ({"tolerance": 0.0}, "tolerance"),
-        ({"tolerance": "tight"}, "tolerance is a str"),
-        ({"soft": -1.0}, "price"),
-        ({"soft": "dear"}, "soft is a str"),
+        ({"tolerance": "tight"}, "tolerance = 'tight', it must be positive, below 1"),
+        ({"soft": -1.0}, "soft = -1.0, it must be positive"),
+        ({"soft": "dear"}, "soft = 'dear'"),
     ],
 )
 def test_bad_options_are_refused(options, message):

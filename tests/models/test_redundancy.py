@@ -338,8 +338,8 @@ def far_path(t: ca.SX) -> ca.SX:
     [
         ({"theta0": [1.0, 2.0]}, "theta0 has 2 entries, 3 are needed"),
         ({"theta0": [1.0, np.nan, 0.0]}, r"theta0\[1\] is nan"),
-        ({"horizon": 0.0}, "horizon = 0.0, it must be > 0"),
-        ({"horizon": np.nan}, r"horizon\[0\] is nan"),
+        ({"horizon": 0.0}, "horizon = 0.0, it must be positive"),
+        ({"horizon": np.nan}, "horizon = nan"),
         ({"weight": -1.0}, "weight = -1.0"),
         ({"correction": -1.0}, "correction = -1.0"),
         ({"cost": "cheap"}, "cost = 'cheap'"),
@@ -350,7 +350,7 @@ def far_path(t: ca.SX) -> ca.SX:
         ({"obstacles": ARM_001.disc, "clearance": 0.2}, r"put it into a tuple: \(Disc"),
         ({"obstacles": [(1.6, 0.7)], "clearance": 0.2}, r"obstacles\[0\] is a tuple, Obstacle"),
         ({"obstacles": [ARM_001.disc], "clearance": [0.2, 0.3]}, "clearance has 2 entries"),
-        ({"obstacles": [TRIANGLE], "clearance": -0.1}, "clearance = -0.1, it must be >= 0"),
+        ({"obstacles": [TRIANGLE], "clearance": -0.1}, "clearance = -0.1, it must be 0 or more"),
         ({"obstacles": [Disc([0.1, 0.1], 0.2)], "clearance": 0.2}, "covers the base of the arm at"),
         (
             {"obstacles": [TRIANGLE.moved([0.0, 0.4])], "clearance": 0.0},

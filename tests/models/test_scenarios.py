@@ -62,8 +62,8 @@ def test_path_clearance_of_a_known_scenario() -> None:
     [
         ({"links": 2, "count": 1}, "links = 2, it must be 3 to 12"),
         ({"links": 13, "count": 1}, "links = 13"),
-        ({"links": 3.5, "count": 1}, "links = 3.5"),
-        ({"links": 3, "count": 0}, "count = 0"),
+        ({"links": 3.5, "count": 1}, "links must be a whole number of at least 1, not 3.5"),
+        ({"links": 3, "count": 0}, "count must be a whole number of at least 1, not 0"),
         ({"links": 3, "count": 1, "difficulty": "brutal"}, "difficulty = 'brutal'"),
     ],
 )

@@ -214,7 +214,7 @@ def test_bad_corners(corners: Any, message: str) -> None:
     ("start", "end", "radius", "message"),
     [
         ([0, 0], [0, 0], 0.1, "take a Disc"),
-        ([0, 0], [0, 1], 0.0, "radius = 0.0, it must be > 0"),
+        ([0, 0], [0, 1], 0.0, "radius = 0.0, it must be positive"),
         ([0, 0, 0], [0, 1], 0.1, "start has 3 entries"),
         ([0, 0], [0, np.inf], 0.1, r"end\[1\] is inf"),
     ],
@@ -256,7 +256,7 @@ def test_obstacles_from_data() -> None:
         ({"center": [0, 0]}, "row 0: shape = None"),
         ({"shape": "disc", "center": [0, 0]}, "missing or unknown: radius"),
         ({**ROWS[0], "color": "red"}, "missing or unknown: color"),
-        ({**ROWS[0], "radius": -1}, "row 0: disc: radius = -1.0"),
+        ({**ROWS[0], "radius": -1}, "row 0: disc: radius = -1, it must"),
         (ROWS[2], "row 0: it moves: pass the symbol of time t"),
         ("disc", "row 0 is a str"),
     ],

@@ -134,7 +134,12 @@ def test_discrete_optimum_is_that_of_the_riccati_recursion() -> None:
 
 @pytest.mark.parametrize(
     ("steps", "dt", "message"),
-    [(0, 0.1, "steps = 0"), (1.5, 0.1, "steps = 1.5"), (3, 0.0, "dt = 0.0"), (3, np.nan, "dt")],
+    [
+        (0, 0.1, "steps must be .* not 0"),
+        (1.5, 0.1, "steps must be .* not 1.5"),
+        (3, 0.0, "dt = 0.0"),
+        (3, np.nan, "dt"),
+    ],
 )
 def test_bad_discrete_problems(steps: int, dt: float, message: str) -> None:
     with pytest.raises(ProblemError, match=message):

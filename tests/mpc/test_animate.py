@@ -89,7 +89,7 @@ def test_planned_inputs_are_shown_where_controls_are_sent(rollout: Rollout) -> N
         ({"speed": 0.0}, "speed"),
         ({"speed": np.nan}, "speed"),
         ({"speed": 1e-6}, "at most 3000"),
-        ({"draw": "the cart"}, "no function"),
+        ({"draw": "the cart"}, "draw is a .*, a function is needed"),
     ],
 )
 def test_what_cannot_be_filmed_is_said(rollout: Rollout, tmp_path: Path, options, said) -> None:

@@ -200,7 +200,7 @@ def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
-        ({"disturbance": 0.3}, "disturbance = 0.3, a function of t is needed"),
+        ({"disturbance": 0.3}, "disturbance is a float, a function is needed"),
         ({"parameters": {"reference": [1.0]}}, "plant: parameters = .* a function of t"),
         ({"saturation": (-1.0, 1.0)}, "plant: saturation is a tuple, Box is needed"),
         ({"disturbance": lambda t: [1.0, 2.0]}, "plant: disturbance has 2 entries"),
@@ -223,8 +223,8 @@ def test_a_problem_is_no_plant() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"dt": 0.0}, "is no run"),
-        ({"dt": np.nan}, "is no run"),
+        ({"dt": 0.0}, r"dt \[s\] = 0.0, it must be positive"),
+        ({"dt": np.nan}, r"dt \[s\] = nan"),
         ({"dt": 0.1, "initial_input": [1.0, 2.0]}, "initial_input has 2 entries"),
         ({"dt": 0.1, "initial_input": np.nan}, "a finite number is needed"),
     ],

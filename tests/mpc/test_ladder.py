@@ -336,7 +336,7 @@ SHARED = MPC(
         ({"dt": np.nan}, r"dt \[s\] = nan"),
         ({"dt": 2.0}, "longer than the horizon"),
         ({"dt": 0.1, "delay": 0.15}, "no multiple"),
-        ({"dt": 0.1, "delay": -0.1}, "no multiple"),
+        ({"dt": 0.1, "delay": -0.1}, r"delay \[s\] = -0.1, it must be 0 or more"),
         ({"dt": 0.1, "budget": 0.0}, "budget"),
         ({"dt": 0.1, "tolerance": -1.0}, "tolerance"),
     ],

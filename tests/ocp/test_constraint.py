@@ -1,5 +1,7 @@
 """Boxes and constraints."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -30,6 +32,22 @@ def test_clip_is_the_nearest_point_and_excess_its_distance(case: tuple[Box, np.n
     assert not box.excess(clipped).any()
     np.testing.assert_array_equal(box.clip(clipped), clipped)
     np.testing.assert_array_equal(box.excess(values), np.abs(values - clipped))
+
+
+@given(boxes_and_values())
+def test_an_expression_is_clipped_as_numbers_are(case: tuple[Box, np.ndarray]) -> None:
+    box, values = case
+    kinds: list[Any] = [ca.SX, ca.MX]
+    for symbols in (kind.sym("v", values.shape[1]) for kind in kinds):
+        clip = ca.Function("clip", [symbols], [box.clip_expression(symbols)])
+        for value in values:
+            np.testing.assert_array_equal(np.array(clip(value)).ravel(), box.clip(value))
+
+
+def test_an_expression_without_bounds_is_itself() -> None:
+    v = ca.SX.sym("v", 3)
+    assert ca.is_equal(Box().clip_expression(v), v)
+    assert ca.is_equal(Box([-np.inf, 0.0, -np.inf]).clip_expression(v)[::2], v[::2])
 
 
 @given(st.integers(1, 6), finite)
