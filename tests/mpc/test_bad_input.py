@@ -201,7 +201,7 @@ def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
     ("plant", "message"),
     [
         ({"disturbance": 0.3}, "disturbance is a float, a function is needed"),
-        ({"parameters": {"reference": [1.0]}}, "plant: parameters = .* a function of t"),
+        ({"parameters": {"reference": [1.0]}}, "plant: parameters is a .*, a function is needed"),
         ({"saturation": (-1.0, 1.0)}, "plant: saturation is a tuple, Box is needed"),
         ({"disturbance": lambda t: [1.0, 2.0]}, "plant: disturbance has 2 entries"),
         ({"disturbance": lambda t: [np.nan]}, "a finite number is needed"),
