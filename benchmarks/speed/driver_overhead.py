@@ -24,7 +24,8 @@ from benchmarks.speed.arm import DT, NOISE, N, arm
 from ocp import MPC, OCP, Applied, FlightRecorder, Program, Solution, Solver, Start, solve
 from solvers import MultipleShooting
 
-FATROP = MultipleShooting(N, backend="fatrop", compiled=True)
+# In this process, so that it uses the same caches.
+FATROP = MultipleShooting(N, backend="fatrop", compiled=True, time_limit=np.inf)
 # Turns at the beginning that do not count, and steps of a turn: the last one does.
 _WARM, _TURN = 3, 2
 _SLEEP = 0.01  # [s]

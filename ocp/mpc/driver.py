@@ -1,7 +1,7 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field
 from math import isfinite
 from time import perf_counter
 from typing import Any
@@ -21,15 +21,13 @@ from ocp.mpc.loop import Watch, closed_loop
 from ocp.mpc.memory import Memory
 from ocp.mpc.moment import Moment
 from ocp.mpc.plant import Plant
+from ocp.mpc.prepared import prepared
 from ocp.mpc.rollout import Rollout
 from ocp.parameters import ParameterValues
 from ocp.problem import OCP
 from ocp.solution import Solution
 from ocp.solver import Solver, Start
 from ocp.status import Status
-
-# What a solver may take that sets itself no limit [s]: far more than a control loop has.
-_PATIENCE = 10.0
 
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
 
@@ -59,8 +57,8 @@ class MPC:
 
     Args:
         ocp: the problem over one horizon. Its t is absolute time: t0 enters at every step.
-        solver: any solver. One that has a ``time_limit`` and leaves it open gets 10 s, so that
-            the loop goes on where third-party code does not return.
+        solver: any solver. Where it, or one inside it, has a ``time_limit`` and leaves it open, a
+            run gets 10 s, so that the loop goes on where third-party code does not return.
         dt: sampling interval [s]; need not divide the horizon, since a shifted plan is
             interpolated. For a discrete-time model it is that model's step. The input is held
             for dt: plans whose controls are held for less are applied only in their first part.
@@ -113,7 +111,7 @@ class MPC:
         self.reset()
         self._ladder = Ladder(
             ocp=self.ocp,
-            program=self._prepared.build(self.ocp),
+            program=prepared(self.solver, compiled=self.compiled).build(self.ocp),
             applied=self.applied,
             backup=self.backup_law,
             guess=self.guess,
@@ -144,20 +142,6 @@ class MPC:
         if self.budget is not None:
             positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
         not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
-
-    @property
-    def _prepared(self) -> Solver:
-        """The solver as a loop needs it: compiled, where that is wanted, and sure to return."""
-        solver = self.solver
-        if not is_dataclass(solver):
-            return solver
-        options = {option.name: getattr(solver, option.name) for option in fields(solver)}
-        wanted: dict[str, Any] = {}
-        if self.compiled and "compiled" in options:
-            wanted["compiled"] = True
-        if "time_limit" in options and options["time_limit"] is None:
-            wanted["time_limit"] = _PATIENCE
-        return replace(solver, **wanted)
 
     @property
     def remembers(self) -> bool:

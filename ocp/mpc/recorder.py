@@ -23,7 +23,8 @@ class FlightRecorder:
     The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
     the shapes of its arrays, these as doubles (what was measured, the input, the plan where
     another one was found good, the parameters), and the message. A record that was cut off by a
-    crash is ignored later. Use it as a context manager and give its ``watch`` to the loop.
+    crash is ignored later. Use it as a context manager and give its ``watch`` to the loop. A record
+    begins with a controller that knows nothing yet: a loop resets it; else call ``reset``.
 
     Args:
         mpc: whose steps are recorded.
@@ -105,6 +106,8 @@ class Replay:
 
 def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
     """Decide a recorded step again, from what was known then.
+
+    Exactly so, but for what a clock ended: a run that met its ``time_limit`` may get further now.
 
     Args:
         mpc: a controller of the same problem, solver and options; its memory is not touched.

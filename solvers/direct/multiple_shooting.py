@@ -45,9 +45,11 @@ class MultipleShooting(Solver):
             interval is halved; an answer beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
-        time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in
-            ``MPC``. fatrop may never return from a problem that cannot be solved, and runs in a
-            process of its own where there is a limit.
+        time_limit: for each run of the backend, of which a solve may take three [s]; inf:
+            unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT returns its iterate,
+            ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; where
+            there is a limit it runs in a process of its own, and once ended it has nothing to
+            show: ``FAILED``.
         rescue: where the search fails, look for the least violating trajectory: it tells an
             infeasible problem from a lost search and is a better start for a second one. It may
             cost 300 iterations; a controller that has to answer in time does without.

@@ -100,8 +100,13 @@ class Search:
             # A backend looks at curvature only where it goes: one that stays on its first
             # controls takes a maximum or a saddle there for a solution. From a minimum the
             # second run comes back at once.
-            answers.append(self.nlp.solve(self._kicked(answers[-1], bounds), p, bounds))
-            status, message = self._verdict(answers[-1], data, bounds)
+            second = self.nlp.solve(self._kicked(answers[-1], bounds), p, bounds)
+            if second.is_lost:
+                answers.insert(0, second)
+                status, message = Status.STATIONARY, f"from beside it, {self._lost(second)}"
+            else:
+                answers.append(second)
+                status, message = self._verdict(second, data, bounds)
         constrained = bool(ocp.constraints) or ocp.state_bounds.is_active
         if self.rescue and constrained and status in _MAYBE_INFEASIBLE:
             found = self._feasibility.least_violating(w0, bounds, p)
@@ -132,7 +137,7 @@ class Search:
     ) -> tuple[Status, str]:
         """Status from the backend's word, the constraints themselves and the integrator."""
         if answer.is_lost:
-            return Status.FAILED, f"{self.options.name} {answer.word}"
+            return Status.FAILED, self._lost(answer)
         if not np.isfinite(answer.cost):
             return Status.DIVERGED, f"the backend met a number that is not finite ({answer.word})"
         violation, row = self.transcription.worst(answer.w, answer.g, bounds)
@@ -153,6 +158,9 @@ class Search:
         if answer.word == "Diverging_Iterates":
             return Status.DIVERGED, where or "the cost may be unbounded below"
         return Status.FAILED, f"{self.options.name} says {answer.word}. {where}".strip()
+
+    def _lost(self, answer: Answer) -> str:
+        return f"{self.options.name} {answer.word}"
 
     def _where(self, answer: Answer, data: Data, violation: float, row: Row | None) -> str:
         if row is None:

@@ -1,6 +1,8 @@
 """The driver never lies and never stops: every rung of the ladder, and the way back."""
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,6 +17,7 @@ from ocp import (
     Box,
     Constraint,
     ControlRefused,
+    FlightRecorder,
     Model,
     Outcome,
     Plant,
@@ -24,8 +27,10 @@ from ocp import (
     Solver,
     Start,
     Status,
+    replay_all,
 )
-from solvers import MultipleShooting
+from ocp.mpc.prepared import prepared
+from solvers import IndirectShooting, MultipleShooting
 from tests.mpc.problems import FASTEST, LIMIT, Change, cart, is_an_input, scripted
 
 DT = 0.1
@@ -115,6 +120,16 @@ def test_a_plan_that_leads_astray_is_no_start_for_ever() -> None:
     assert rollout.outcomes[7] is Outcome.OPTIMAL
 
 
+def test_a_start_afresh_is_replayed(tmp_path: Path) -> None:
+    """From its own guess the solver takes other iterations, and ends at other last digits."""
+    bad = {round(DT * k, 2): becomes(Status.ITERATION_LIMIT) for k in (2, 3, 4)}
+    script = {**bad, 0.2: becomes(Status.DIVERGED), 0.3: raises(RuntimeError("as the script says"))}
+    mpc = controller(script)
+    with FlightRecorder(mpc, tmp_path / "flight") as recorder:
+        mpc.run(Plant(ocp=mpc.ocp, measurement_noise=1e-3), [1.0, 0.0], 0.8, watch=recorder.watch)
+    assert all(again.is_exact for again in replay_all(mpc, tmp_path / "flight", range(8)))
+
+
 def test_what_is_not_measured_is_no_failure_of_the_plan() -> None:
     watched = Watched(scripted({}))
     mpc = MPC(ocp=cart(), solver=watched, dt=DT)
@@ -125,12 +140,21 @@ def test_what_is_not_measured_is_no_failure_of_the_plan() -> None:
     assert [guess is None for guess in watched.seen] == [True, False]
 
 
-def test_a_solver_without_a_limit_gets_one() -> None:
-    for own, used in ((None, 10.0), (0.5, 0.5)):
-        solver = MultipleShooting(10, time_limit=own)
+def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
+    def used(solver: Solver) -> Any:
         mpc = MPC(ocp=cart(), solver=solver, dt=DT, compiled=False)
         assert mpc.solver is solver
-        assert mpc._prepared == replace(solver, time_limit=used)
+        program: Any = mpc._ladder.program
+        return program.solver
+
+    plain = MultipleShooting(10)
+    assert used(plain) == replace(plain, time_limit=10.0)
+    for limit in (0.5, np.inf):
+        assert used(replace(plain, time_limit=limit)).time_limit == limit
+    assert used(scripted({})).inner == replace(plain, time_limit=10.0)
+    assert prepared(plain, compiled=True) == replace(plain, time_limit=10.0, compiled=True)
+    shooting = IndirectShooting()
+    assert prepared(shooting, compiled=False) is shooting
 
 
 def test_a_small_excess_is_clipped_and_recorded() -> None:

@@ -3,13 +3,15 @@
 import gc
 import multiprocessing
 import os
+import pickle
 import signal
 import subprocess
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from threading import Timer
-from typing import NoReturn
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -18,8 +20,8 @@ import pytest
 from benchmarks.mpc.fault_problems import arm
 from ocp import Compiler, ProblemError, Status
 from solvers import Collocation, MultipleShooting
-from solvers.direct.apart import POSSIBLE, Apart, Lost
-from solvers.direct.backend import Nlp
+from solvers.direct.apart import POSSIBLE, Apart, Lost, Outputs
+from solvers.direct.multiple_shooting import MultipleShootingProgram
 from tests.mpc.problems import cart
 
 # One number in, one out; what it does depends on the sign.
@@ -74,8 +76,71 @@ def test_a_loss_is_named_and_the_next_call_is_answered(
 @apart
 def test_an_exception_is_one_here_too(moody: ca.Function) -> None:
     function = Apart(moody, 0.2)
-    with pytest.raises(RuntimeError, match="threw"):
+    with pytest.raises(RuntimeError, match="moody"):
         called(function, THROW)
+    assert called(function, FINE) == 2.0
+
+
+@apart
+def test_wrong_inputs_are_an_exception_that_says_so(moody: ca.Function) -> None:
+    function = Apart(moody, 0.2)
+    with pytest.raises(RuntimeError, match="i7"):
+        function({"i7": np.zeros(1)})
+    assert called(function, FINE) == 2.0
+
+
+@apart
+@pytest.mark.parametrize("word", [signal.SIGKILL, signal.SIGALRM])
+def test_answers_stay_with_their_questions(moody: ca.Function, word: signal.Signals) -> None:
+    """Who answers may die between two calls, of memory that is short or by somebody's hand."""
+    function = Apart(moody, 5.0)
+    assert called(function, FINE) == 2.0
+    children = Path(f"/proc/{function.process}/task/{function.process}/children")
+    if not children.exists():
+        pytest.skip("this system does not list the children of a process")
+    (child,) = children.read_text().split()
+    os.kill(int(child), word)
+    with pytest.raises(Lost):
+        called(function, 10.0)
+    assert [called(function, x) for x in (20.0, 30.0)] == [21.0, 31.0]
+
+
+@apart
+def test_the_limit_holds_where_its_owner_ignores_alarms(moody: ca.Function) -> None:
+    before = signal.signal(signal.SIGALRM, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+    try:
+        function = Apart(moody, 0.2)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
+    with pytest.raises(Lost, match="within"):
+        called(function, LOOP)
+
+
+@apart
+def test_copies_have_processes_of_their_own(moody: ca.Function) -> None:
+    function = Apart(moody, 0.2, verbose=True)
+    for copy in (deepcopy(function), pickle.loads(pickle.dumps(function))):
+        assert (copy.seconds, copy.verbose) == (0.2, True)
+        assert copy.process != function.process
+        assert called(copy, FINE) == 2.0
+
+
+@apart
+def test_a_limit_of_ages_is_one(moody: ca.Function) -> None:
+    assert called(Apart(moody, 1e20), FINE) == 2.0
+
+
+@apart
+def test_a_server_that_does_not_start_is_a_loss(
+    moody: ca.Function, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("solvers.direct.apart._SERVER", Path("nowhere.py"))
+    function = Apart(moody, 1.0)
+    with pytest.raises(Lost, match="ended with its process"):
+        called(function, FINE)
+    monkeypatch.undo()
     assert called(function, FINE) == 2.0
 
 
@@ -159,30 +224,55 @@ def test_fatrop_is_ended_where_it_never_returns() -> None:
     data = dict(np.load(DATA))
     w0, p = data.pop("w0"), data.pop("p")
     answer = nlp.solve(w0, p, data)
-    assert not answer.success
+    assert answer.is_lost
+    assert answer.word == "did not return within 0.5 s"
     np.testing.assert_array_equal(answer.w, w0)
     assert nlp.solve(0.0 * w0, p, data).w.shape == w0.shape, "and it goes on"
 
 
 class Stuck(Apart):
-    """Without a process, and without answers."""
+    """Without a process; after some answers there are no more."""
 
-    def __init__(self) -> None:
-        pass
+    def __init__(self, function: ca.Function, answers: int = 0) -> None:
+        self.function, self.answers = function, answers
 
-    def __call__(self, inputs: dict[str, np.ndarray]) -> NoReturn:
-        raise Lost("did not return within 1 s")
+    def __call__(self, inputs: dict[str, np.ndarray]) -> tuple[Outputs, dict[str, Any]]:
+        self.answers -= 1
+        if self.answers < 0:
+            raise Lost("did not return within 1 s")
+        outputs = {name: np.array(v).ravel() for name, v in self.function(**inputs).items()}
+        return outputs, self.function.stats()
+
+
+def stuck(answers: int = 0, *, rescue: bool = False) -> MultipleShootingProgram:
+    solver = MultipleShooting(10, backend="fatrop", rescue=rescue)
+    program = solver.build(cart())
+    own = program.search.nlp
+    program.search.__dict__["nlp"] = replace(own, apart=Stuck(own.function, answers))
+    return program
 
 
 def test_a_lost_answer_is_a_failure_with_a_reason() -> None:
-    program = MultipleShooting(10, backend="fatrop", rescue=False).build(cart())
-    own = program.search.nlp
-    program.search.__dict__["nlp"] = Nlp(own.function, own.verbose, Stuck())
-    solution = program.run()
+    solution = stuck().run()
     assert solution.status is Status.FAILED
     assert solution.message == "fatrop did not return within 1 s"
     assert solution.cost == np.inf
     assert np.isfinite(solution.x).all()
+
+
+def test_a_lost_answer_may_be_rescued_as_any_failure() -> None:
+    solution = stuck(rescue=True).run()
+    assert solution.status is Status.FAILED, "the constraints can be met, and it is lost again"
+    assert "did not return" in solution.message
+
+
+def test_an_answer_is_kept_where_only_its_test_is_lost() -> None:
+    """From its own solution a solver does not move, and looks beside it."""
+    good = MultipleShooting(10, backend="fatrop").build(cart()).run()
+    solution = stuck(answers=1).run(guess=good)
+    assert solution.status is Status.STATIONARY
+    assert "from beside it, fatrop did not return" in solution.message
+    assert solution.cost == pytest.approx(good.cost, rel=1e-9)
 
 
 @pytest.mark.parametrize("solver", [MultipleShooting(20), Collocation(10)], ids=["ms", "colloc"])
