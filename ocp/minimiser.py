@@ -47,6 +47,8 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     residual = u - box.clip_expression(u - slope) if box.is_active else slope
     options = {"abstol": 1e-13, "abstolStep": 1e-13, "max_iter": 50}
     options |= {"error_on_fail": False, "show_eval_warnings": False}
+    # The default, "qr", has no answer for a matrix with an entry of 1e-157: its square is none.
+    options |= {"linear_solver": "symbolicqr"}
     given = ca.vertcat(*inputs)
     root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
     start: Any = box.clip(np.zeros(m.nu))

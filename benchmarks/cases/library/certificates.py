@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-# Of the file: 1 had one set of versions for all entries.
+# Of the file; 1 had one set of versions for all entries.
 FORMAT = 2
 COMMITTED = Path(__file__).parents[2] / "data" / "certificates.json"
 
@@ -27,24 +27,18 @@ class Certificates:
     def read(cls, file: Path) -> "Certificates":
         """Read a file; nothing where there is none.
 
-        A file of the first format has the versions of its last run alone, and nobody knows
-        of which entries they are: there every entry gets them, marked as those of the file.
-
         Raises:
-            ValueError: if it is no file of certificates, or of a later format.
+            ValueError: if it is no file of certificates, or of another format.
         """
         if not file.exists():
             return cls()
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
-            written, cases = content.get("format", 1), content["cases"]
-            if written == 1:
-                old = {**content["versions"], "of": "the file's last run"}
-                return cls({name: {**entry, "versions": old} for name, entry in cases.items()})
+            written, cases = content["format"], content["cases"]
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as reason:
             raise ValueError(f"{file} is no file of certificates: {reason!r}") from None
         if written != FORMAT:
-            raise ValueError(f"{file} has format {written}; this version reads 1 and {FORMAT}")
+            raise ValueError(f"{file} has format {written}; this version reads {FORMAT}")
         lacking = [name for name, entry in cases.items() if "versions" not in entry]
         if lacking:
             raise ValueError(f"{file} is no file of certificates: '{lacking[0]}' has no versions")
