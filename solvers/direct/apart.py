@@ -54,6 +54,7 @@ class Apart:
         """Start the process."""
         self.function, self.seconds, self.verbose = function, min(seconds, _LONGEST), verbose
         self._finish: Callable[[], object] | None = None
+        self._lock = Lock()
         self._start()
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[ca.Function, float]]:
@@ -67,7 +68,8 @@ class Apart:
             RuntimeError: where the Function does.
             Lost: if the call took too long, or its process ended by itself.
         """
-        if self._owner != os.getpid():  # a fork: the process is still the other one's
+        if self._owner != os.getpid():  # a fork: process, and who waits for it, are the other one's
+            self._lock = Lock()
             self._start()
         with self._lock:
             answer = self._asked_for(inputs)
@@ -115,7 +117,7 @@ class Apart:
                 # Ctrl-C is for this process; and all of that session can be ended at once.
                 start_new_session=True,
             )
-        self.process, self._owner, self._lock = process.pid, os.getpid(), Lock()
+        self.process, self._owner = process.pid, os.getpid()
         self._asked = self._answered = 0
         self._finish = finalize(self, _end, process, self._pipe, self._owner)
         with suppress(ConnectionError):  # it died at once: the first call will find out
