@@ -134,10 +134,9 @@ def test_a_report_comes_back_and_a_bad_one_is_refused(tmp_path, capsys):
         Report.read(tmp_path / "none.json")
 
 
-@pytest.mark.parametrize("run", ["peers.json", "more_peers.json"])
-def test_the_page_shows_the_committed_results(run):
+def test_the_page_shows_the_committed_results():
     page = DATA.parent.parent / "docs" / "peers.md"
-    assert markdown(Report.read(DATA / run)).strip() in page.read_text(encoding="utf-8")
+    assert markdown(Report.read(DATA / "peers.json")).strip() in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["control", "ssqp", "nmpyc"])
