@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import casadi as ca
 import numpy as np
@@ -12,7 +12,14 @@ from ocp.errors import ProblemError
 from ocp.expressions import column, instance, numbers
 
 Place = Literal["path", "initial", "terminal"]
+PLACES: tuple[Place, ...] = get_args(Place)
 _RELATIONS = (ca.OP_LE, ca.OP_LT, ca.OP_EQ, ca.OP_NE)
+
+
+def a_place(value: object, what: str) -> None:
+    """Check that ``value`` is where a constraint may hold, or raise ``ProblemError``."""
+    if value not in PLACES:
+        raise ProblemError(f"{what} = {value!r} is no place; {', '.join(map(repr, PLACES))} are")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +94,7 @@ class Constraint:
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
         instance(self.name, str, "the name of a constraint")
-        if self.at not in ("path", "initial", "terminal"):
-            raise ProblemError(
-                f"constraint '{self.name}': at = {self.at!r} is no place; "
-                "'path', 'initial' and 'terminal' are"
-            )
+        a_place(self.at, f"constraint '{self.name}': at")
         expression = column(self.expression, f"constraint '{self.name}'")
         for row in ca.vertsplit(expression):
             if row.op() in _RELATIONS:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ocp.constraint import Box, Constraint
+from ocp.constraint import PLACES, Box, Constraint
 
 if TYPE_CHECKING:
     from ocp.problem import OCP
@@ -51,7 +51,7 @@ def probe(ocp: "OCP") -> dict[str, np.ndarray]:
         "state bounds": _stacked(ocp.state_bounds),
         "horizon": np.concatenate([_stacked(ocp.time_box), [ocp.model.dt or 0.0]]),
     }
-    for at in ("path", "initial", "terminal"):
+    for at in PLACES:
         bounds = [_stacked(c) for c in ocp.at(at)]
         parts[f"{at} constraints"] = np.concatenate([parts[f"{at} constraints"], *bounds])
     return parts

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.constraint import Box, Constraint
+from ocp.constraint import Box, Constraint, Place, a_place
 from ocp.describe import describe
 from ocp.errors import ProblemError
 from ocp.expressions import (
@@ -159,8 +159,9 @@ class OCP:
             return None
         return int(self.horizon)
 
-    def at(self, place: Literal["path", "initial", "terminal"]) -> tuple[Constraint, ...]:
+    def at(self, place: Place) -> tuple[Constraint, ...]:
         """Return the constraints of one place."""
+        a_place(place, f"{self.name}: the place of constraints")
         return tuple(c for c in self.constraints if c.at == place)
 
     @cached_property

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ocp.constraint import Constraint
+from ocp.constraint import Constraint, Place
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Row:
     """
 
     name: str
-    place: Literal["dynamics", "time", "path", "initial", "terminal"]
+    place: Literal["dynamics", "time"] | Place
     node: int
     lower: float
     upper: float
@@ -33,9 +33,7 @@ class Row:
         return self.lower == self.upper
 
 
-def rows_of(
-    constraints: Iterable[Constraint], place: Literal["path", "initial", "terminal"]
-) -> list[Row]:
+def rows_of(constraints: Iterable[Constraint], place: Place) -> list[Row]:
     """Return the rows of constraints, one for each component, at node 0.
 
     Args:

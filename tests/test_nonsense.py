@@ -293,6 +293,8 @@ CALLS: list[tuple[str, Wrong]] = [
     ("GPC: weight = 'a'", lambda: GPC(**{"weight": "a"})),
     ("GPC: tolerance = 1.0, it must be positive, below 1", lambda: GPC(tolerance=1.0)),
     ("certify: seconds = 'a'", lambda: Effort(**{"seconds": "a"})),
+    ("the place of constraints = 'terminl' is no place; 'path',",
+     lambda: problem().at(*["terminl"])),
     # The loop.
     ("tolerance = 'a', it must be 0 or more",
      lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"tolerance": "a"})),
