@@ -38,8 +38,9 @@ class Apart:
     """A CasADi Function that cannot hang or crash the process that calls it.
 
     A limit of iterations, or a clock in this process, is no use where compiled code of somebody
-    else loops inside one iteration. A call costs some tenths of a millisecond more than in this
-    process, the first one some tenths of a second; after a loss the next is as quick as ever.
+    else loops inside one iteration. A call takes longer than in this process, by what
+    ``python -m benchmarks arm-speed --only-driver`` shows, the first one by some tenths of a
+    second; after a loss the next is as quick as ever.
 
     Args:
         function: must be one that can be pickled.
