@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import numbers
+from ocp.internal import check_numbers
 
 
 def vector(values: ArrayLike, size: int, what: str) -> np.ndarray:
     """Return ``values`` as ``ocp.numbers`` does; one number does not stand for all."""
-    return numbers(values, size, what, repeat=False)
+    return check_numbers(values, size, what, repeat=False)

@@ -13,7 +13,8 @@ from models.distance_cost import DistanceCost
 from models.distances import signed_distance
 from models.obstacles import Disc, Obstacle, link_distances
 from models.sampling import sampled
-from ocp import Constraint, Parameter, ProblemError, Signal, instance, not_negative, positive
+from ocp import Constraint, Parameter, ProblemError, Signal
+from ocp.internal import check_instance, check_not_negative, check_positive
 
 
 def clearance_constraint(
@@ -27,7 +28,7 @@ def clearance_constraint(
         obstacles: from whose cores the links keep away.
         clearance: one distance for all, or one for each obstacle [m].
     """
-    instance(arm, PlanarArm, "clearance: arm")
+    check_instance(arm, PlanarArm, "clearance: arm")
     least = np.broadcast_to(np.asarray(clearance, dtype=float).reshape(-1), len(obstacles))
     distances = [link_distances(arm, theta, obstacle) for obstacle in obstacles]
     return Constraint("clearance", ca.vertcat(*distances), lower=np.repeat(least, arm.n))
@@ -49,9 +50,9 @@ def check_avoidance(
         kind = type(obstacles).__name__
         raise ProblemError(f"{name}: obstacles is a {kind}; put it into a tuple: ({kind}(...),)")
     for i, obstacle in enumerate(obstacles):
-        instance(obstacle, Obstacle, f"{name}: obstacles[{i}]")
+        check_instance(obstacle, Obstacle, f"{name}: obstacles[{i}]")
     if distance_cost is not None:
-        instance(distance_cost, DistanceCost, f"{name}: distance_cost")
+        check_instance(distance_cost, DistanceCost, f"{name}: distance_cost")
     if clearance is None:
         if obstacles and distance_cost is None:
             raise ProblemError(f"{name}: obstacles need a distance_cost or a clearance to matter")
@@ -61,7 +62,7 @@ def check_avoidance(
     count = np.size(clearance)
     least = vector(clearance, 1 if count == 1 else len(obstacles), f"{name}: clearance")
     for obstacle, d in zip(obstacles, np.broadcast_to(least, len(obstacles)).tolist(), strict=True):
-        check = positive if isinstance(obstacle, Disc) else not_negative
+        check = check_positive if isinstance(obstacle, Disc) else check_not_negative
         check(d, f"{name}: clearance")
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import ProblemError, instance, real, whole
+from ocp import ProblemError
+from ocp.internal import check_instance, check_real, check_whole
 
 # Roots of C closer to the unit circle than this: its filter forgets too slowly to be of use.
 _STABLE = 1.0 - 1e-9
@@ -52,7 +53,7 @@ class Carima:
                 raise ProblemError(f"carima: {name} must begin with 1, not {getattr(self, name)}")
         if not any(self.b):
             raise ProblemError("carima: b is zero, the input has no effect")
-        whole(self.delay, "carima: delay", least=0)
+        check_whole(self.delay, "carima: delay", least=0)
         outside = np.abs(np.roots(self.c)).max(initial=0.0)
         if outside > _STABLE:
             raise ProblemError(f"carima: c has a zero of modulus {outside:.4g}, 1 or more")
@@ -95,8 +96,8 @@ class CarimaPlant:
 
     def __init__(self, model: Carima, start: float = 0.0) -> None:
         """Rest at ``start`` with input 0 (counted from the input that keeps it there)."""
-        instance(model, Carima, "carima plant: model")
-        real(start, "carima plant: start")
+        check_instance(model, Carima, "carima plant: model")
+        check_real(start, "carima plant: start")
         self.model = model
         self._a = np.convolve(model.a, [1.0, -1.0])
         self._y = [start] * len(self._a)

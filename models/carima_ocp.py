@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.carima import Carima
-from ocp import OCP, Box, Constraint, Model, ProblemError, Signal, instance, not_negative, whole
+from ocp import OCP, Box, Constraint, Model, ProblemError, Signal
+from ocp.internal import check_instance, check_not_negative, check_whole
 
 
 def carima_ocp(
@@ -52,9 +53,9 @@ def carima_ocp(
     Raises:
         ProblemError: naming what is wrong.
     """
-    instance(model, Carima, "carima: model")
+    check_instance(model, Carima, "carima: model")
     w = vector(reference, np.size(reference), "carima: reference")
-    n = len(w) - 1 if steps is None else whole(steps, "carima: steps")
+    n = len(w) - 1 if steps is None else check_whole(steps, "carima: steps")
     w = np.full(n + 1, w[0]) if w.size == 1 else w
     if n < 1 or w.size != n + 1:
         raise ProblemError(f"carima: reference has {w.size} entries, {n + 1} are needed")
@@ -74,7 +75,7 @@ def carima_ocp(
         model=Model(name="carima", x=symbol, u=control, f=after, dt=1.0),
         x0=layout.state(outputs, inputs, noise),
         horizon=n,
-        running_cost=miss + not_negative(weight, "carima: weight") * control**2,
+        running_cost=miss + check_not_negative(weight, "carima: weight") * control**2,
         terminal_cost=miss,
         control_bounds=increment_bounds or Box(),
         state_bounds=Box(*state_bounds),

@@ -7,18 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import (
-    OCP,
-    Box,
-    Constraint,
-    Guess,
-    Model,
-    ProblemError,
-    instance,
-    not_negative,
-    positive,
-    real,
-)
+from ocp import OCP, Box, Constraint, Guess, Model, ProblemError
+from ocp.internal import check_instance, check_not_negative, check_positive, check_real
 
 # Weights of position, angle, velocity and angular velocity, and of the force.
 _STAGE, _END, _FORCE = (1.0, 1.0, 0.1, 0.1), (100.0, 100.0, 10.0, 10.0), 0.01
@@ -73,7 +63,7 @@ class CartPole:
         """Check the numbers."""
         for entry in fields(self):
             name = f"cart-pole: {entry.name}"
-            check = not_negative if entry.name == "gravity" else positive
+            check = check_not_negative if entry.name == "gravity" else check_positive
             check(getattr(self, entry.name), name)
 
     def model(self) -> Model:
@@ -135,7 +125,7 @@ def cart_pole_swing_up(
     Raises:
         ProblemError: if a bound is negative, or the end lies beyond the track.
     """
-    model, goal = _model(system), real(distance, "cart-pole: distance")
+    model, goal = _model(system), check_real(distance, "cart-pole: distance")
     end = [goal, np.pi, 0.0, 0.0]
     return OCP(
         name="cart-pole swing-up",
@@ -192,11 +182,11 @@ def cart_pole_upright(
         ProblemError: if a bound or weight is negative, or the target lies beyond the track or
             in its cushion.
     """
-    model, goal = _model(system), real(distance, "cart-pole: distance")
+    model, goal = _model(system), check_real(distance, "cart-pole: distance")
     off = model.x - ca.DM([goal, np.pi, 0.0, 0.0])
     q, s = (_weights(w, name) for w, name in ((stage, "stage"), (end, "end")))
-    r = positive(effort, "cart-pole: effort")
-    soft, on_track = not_negative(cushion, "cart-pole: cushion"), _on(track, distance)
+    r = check_positive(effort, "cart-pole: effort")
+    soft, on_track = check_not_negative(cushion, "cart-pole: cushion"), _on(track, distance)
     if soft and not abs(distance) <= track - soft < np.inf:
         raise ProblemError(
             f"cart-pole: with a cushion of {soft} m the track of {track} m must be finite, and "
@@ -218,13 +208,13 @@ def cart_pole_upright(
 
 def _model(system: CartPole | None) -> Model:
     if system is not None:
-        instance(system, CartPole, "cart-pole: system")
+        check_instance(system, CartPole, "cart-pole: system")
     return (system or CartPole()).model()
 
 
 def _within(force: float, what: str) -> Box:
     """Return |u| <= force; inf is allowed."""
-    largest = not_negative(force, f"cart-pole: {what}", finite=False)
+    largest = check_not_negative(force, f"cart-pole: {what}", finite=False)
     return Box(-largest, largest)
 
 

@@ -9,7 +9,8 @@ import casadi as ca
 
 from models.arm import PlanarArm
 from models.obstacles import Obstacle, link_distances
-from ocp import ProblemError, not_negative, positive
+from ocp import ProblemError
+from ocp.internal import check_not_negative, check_positive
 
 Combine = Literal["sum", "closest"]
 
@@ -43,8 +44,8 @@ class DistanceCost:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        not_negative(self.gain, "distance cost: gain")
-        positive(self.influence, "distance cost: influence")
+        check_not_negative(self.gain, "distance cost: gain")
+        check_positive(self.influence, "distance cost: influence")
         if self.combine not in ("sum", "closest"):
             raise ProblemError(
                 f"distance cost: combine = {self.combine!r}, neither sum nor closest"

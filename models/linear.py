@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import Model, ProblemError, positive, real
+from ocp import Model, ProblemError
+from ocp.internal import check_positive, check_real
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,7 +83,7 @@ class LinearPlant:
 
     def sampled(self, dt: float) -> "LinearPlant":
         """Return the discrete-time plant under a zero-order hold of dt [s], through scipy."""
-        positive(dt, f"{self.name}: dt")
+        check_positive(dt, f"{self.name}: dt")
         if self.dt is not None:
             raise ProblemError(f"{self.name}: sampled already, every {self.dt:g} s")
         from scipy import signal  # as above
@@ -146,9 +147,9 @@ def mass_spring_damper(
         damping: c [Ns/m].
         mass: m [kg], positive.
     """
-    k = real(stiffness, "mass-spring-damper: stiffness")
-    c = real(damping, "mass-spring-damper: damping")
-    m = positive(mass, "mass-spring-damper: mass")
+    k = check_real(stiffness, "mass-spring-damper: stiffness")
+    c = check_real(damping, "mass-spring-damper: damping")
+    m = check_positive(mass, "mass-spring-damper: mass")
     return LinearPlant(
         name="mass-spring-damper",
         A=np.array([[0.0, 1.0], [-k / m, -c / m]]),

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.linear import LinearPlant, mass_spring_damper, matrix
-from ocp import OCP, Box, ProblemError, Signal, instance, positive, whole
+from ocp import OCP, Box, ProblemError, Signal
+from ocp.internal import check_instance, check_positive, check_whole
 
 # More asymmetry of a weight than this, relative to its largest entry, is no slip of rounding.
 _SYMMETRIC = 1e-12
@@ -44,7 +45,7 @@ def lq_regulator(
     Raises:
         ProblemError: if a weight has a wrong size, is not symmetric or not (semi-)definite.
     """
-    instance(plant, LinearPlant, "lq_regulator: plant")
+    check_instance(plant, LinearPlant, "lq_regulator: plant")
     return _problem(plant, ca.SX.zeros(len(plant.A)), (), Q, R, P, x0, horizon,
                     (control_bounds, state_bounds))  # fmt: skip
 
@@ -79,7 +80,7 @@ def tracking_ocp(
         control_bounds: box around the controls.
         state_bounds: box around the states.
     """
-    instance(plant, LinearPlant, "tracking_ocp: plant")
+    check_instance(plant, LinearPlant, "tracking_ocp: plant")
     w = ca.vertcat(*[ca.SX.sym(f"reference of {name}") for name in plant.x_names])
     signals = (Signal("reference", w, reference),)
     return _problem(plant, w, signals, Q, R, P, x0, horizon, (control_bounds, state_bounds))
@@ -96,7 +97,7 @@ def sinusoid(
         period: [s].
         moving: False: the velocity of the reference is zero throughout.
     """
-    rate = 2.0 * np.pi / positive(period, "sinusoid: period")
+    rate = 2.0 * np.pi / check_positive(period, "sinusoid: period")
     phase = rate * vector(t, np.size(t), "sinusoid: t")
     velocity = amplitude * rate * np.cos(phase) * float(moving)
     return np.stack([amplitude * np.sin(phase), velocity], axis=1)
@@ -129,8 +130,8 @@ def thesis_tracking(steps: int, *, dt: float = 0.05, moving: bool = True) -> OCP
         dt: step [s].
         moving: whether the reference has the velocity of the sinusoid, or none.
     """
-    whole(steps, "thesis_tracking: steps")
-    positive(dt, "thesis_tracking: dt [s]")
+    check_whole(steps, "thesis_tracking: steps")
+    check_positive(dt, "thesis_tracking: dt [s]")
     return tracking_ocp(
         mass_spring_damper().sampled(dt),
         sinusoid(dt * np.arange(steps + 1), moving=moving),

@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import casadi as ca
 
 from models.obstacles import Capsule, Disc, Obstacle, Polygon
-from ocp import ProblemError, instance
+from ocp import ProblemError
+from ocp.internal import check_instance
 
 # The shapes and the numbers that each needs.
 _SHAPES: dict[str, tuple[Callable[..., Obstacle], frozenset[str]]] = {
@@ -32,7 +33,7 @@ def obstacles_from_data(
     Raises:
         ProblemError: naming the row and what is missing, unknown or wrong in it.
     """
-    instance(rows, Sequence, "obstacle data: rows")
+    check_instance(rows, Sequence, "obstacle data: rows")
     return tuple(_obstacle(row, t, f"obstacle data: row {i}") for i, row in enumerate(rows))
 
 

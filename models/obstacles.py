@@ -12,7 +12,8 @@ from models._convex import counter_clockwise
 from models._numbers import vector
 from models.arm import PlanarArm
 from models.distances import signed_distance
-from ocp import ProblemError, instance, not_negative, positive
+from ocp import ProblemError
+from ocp.internal import check_instance, check_not_negative, check_positive
 
 Point = ca.SX | ArrayLike
 # Directions in which the outline of an obstacle is drawn.
@@ -99,7 +100,7 @@ class Disc(Obstacle):
     def __post_init__(self) -> None:
         """Check the numbers."""
         object.__setattr__(self, "center", _point(self.center, "disc: center"))
-        radius = positive(self.radius, "disc: radius")
+        radius = check_positive(self.radius, "disc: radius")
         object.__setattr__(self, "radius", radius)
 
     @property
@@ -134,7 +135,7 @@ class Capsule(Obstacle):
         """Check the numbers."""
         for name in ("start", "end"):
             object.__setattr__(self, name, _point(getattr(self, name), f"capsule: {name}"))
-        radius = positive(self.radius, "capsule: radius")
+        radius = check_positive(self.radius, "capsule: radius")
         object.__setattr__(self, "radius", radius)
         length = ca.SX(_casadi(self.end) - _casadi(self.start))
         if length.is_constant() and float(ca.norm_2(length)) == 0.0:
@@ -173,7 +174,7 @@ class Polygon(Obstacle):
         """Check the numbers."""
         object.__setattr__(self, "corners", counter_clockwise(self.corners))
         object.__setattr__(self, "position", _point(self.position, "polygon: position"))
-        object.__setattr__(self, "radius", not_negative(self.radius, "polygon: radius"))
+        object.__setattr__(self, "radius", check_not_negative(self.radius, "polygon: radius"))
 
     @property
     def core(self) -> ca.SX | ca.DM:
@@ -191,8 +192,8 @@ def link_distances(arm: PlanarArm, theta: ca.SX | ArrayLike, obstacle: Obstacle)
 
     The arm is clear of the obstacle where all are at least its radius.
     """
-    instance(arm, PlanarArm, "link distances: arm")
-    instance(obstacle, Obstacle, "link distances: obstacle")
+    check_instance(arm, PlanarArm, "link distances: arm")
+    check_instance(obstacle, Obstacle, "link distances: obstacle")
     joints, core = arm.joints(theta), obstacle.core
     links = [(joints[:, i], joints[:, i + 1]) for i in range(arm.n)]
     return ca.vertcat(*[signed_distance(core, a, b) for a, b in links])

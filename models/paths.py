@@ -6,7 +6,8 @@ import casadi as ca
 from numpy.typing import ArrayLike
 
 from models._numbers import vector
-from ocp import ProblemError, function
+from ocp import ProblemError
+from ocp.internal import check_callable
 
 # Time t [s], an SX, to the position (2,) [m].
 Path = Callable[[ca.SX], ca.SX]
@@ -37,7 +38,7 @@ def path_position(path: Path, t: ca.SX) -> ca.SX:
     Raises:
         ProblemError: if the path does not return two expressions or numbers.
     """
-    function(path, "path")
+    check_callable(path, "path")
     position = path(t)
     try:
         column = ca.SX(ca.vertcat(*position) if isinstance(position, list | tuple) else position)

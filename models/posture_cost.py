@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.arm import PlanarArm
-from ocp import ProblemError, instance, not_negative, positive
+from ocp import ProblemError
+from ocp.internal import check_instance, check_not_negative, check_positive
 
 
 class PostureCost(ABC):
@@ -52,7 +53,7 @@ class JointLimitCost(PostureCost):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        not_negative(self.gain, "joint limit cost: gain")
+        check_not_negative(self.gain, "joint limit cost: gain")
         for name in ("lower", "upper"):
             values = getattr(self, name)
             what = f"joint limit cost: {name}"
@@ -97,8 +98,8 @@ class ManipulabilityCost(PostureCost):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        not_negative(self.gain, "manipulability cost: gain")
-        positive(self.influence, "manipulability cost: influence")
+        check_not_negative(self.gain, "manipulability cost: gain")
+        check_positive(self.influence, "manipulability cost: influence")
 
     def of(self, arm: PlanarArm, theta: ca.SX) -> ca.SX:
         """Return the cost of a configuration (n,) [rad]."""
@@ -113,7 +114,7 @@ def squared_manipulability(arm: PlanarArm, theta: ca.SX) -> ca.SX:
         arm: the arm, n links.
         theta: configuration (n,) [rad].
     """
-    instance(arm, PlanarArm, "squared manipulability: arm")
+    check_instance(arm, PlanarArm, "squared manipulability: arm")
     jacobian = arm.jacobian(theta)
     first, second = jacobian[0, :], jacobian[1, :]
     return ca.sumsqr(first) * ca.sumsqr(second) - ca.dot(first, second) ** 2

@@ -9,24 +9,14 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.arm import PlanarArm
+from models.arm_path import ArmPath
 from models.avoidance import Surroundings, check_avoidance, clearance_constraint
 from models.distance_cost import DistanceCost
 from models.obstacles import Obstacle
 from models.paths import Path, path_position, path_velocity
 from models.posture_cost import PostureCost
-from models.task import Task
-from ocp import (
-    OCP,
-    Box,
-    Constraint,
-    Model,
-    Parameter,
-    ProblemError,
-    Signal,
-    instance,
-    not_negative,
-    positive,
-)
+from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal
+from ocp.internal import check_instance, check_not_negative, check_positive
 
 Cost = Literal["regularised", "raw"]
 Form = Literal["null-space", "velocity"]
@@ -115,16 +105,16 @@ def redundancy_ocp(
             obstacle on the base, a start inside an obstacle.
     """
     t = ca.SX.sym("t") if t is None else t
-    instance(arm, PlanarArm, f"{name}: arm")
+    check_instance(arm, PlanarArm, f"{name}: arm")
     start = vector(theta0, arm.n, f"{name}: theta0")
-    duration = positive(horizon, f"{name}: horizon")
-    k = not_negative(weight, f"{name}: weight")
-    gain = not_negative(correction, f"{name}: correction")
+    duration = check_positive(horizon, f"{name}: horizon")
+    k = check_not_negative(weight, f"{name}: weight")
+    gain = check_not_negative(correction, f"{name}: correction")
     _check_choices(name, cost, form)
     check_avoidance(name, obstacles, distance_cost, clearance)
     _check_kinds(name, posture_costs, joint_bounds, velocity_bounds)
     target = path_position(path, t)
-    task = Task(
+    task = ArmPath(
         arm=arm, position=target, t=t, horizon=duration, parameters=tuple(parameters), name=name
     )
     task.check(start, must_start_on_path=gain == 0.0 and not free_start)
@@ -228,10 +218,10 @@ def _check_kinds(
     velocity_bounds: Box | None,
 ) -> None:
     for i, term in enumerate(posture_costs):
-        instance(term, PostureCost, f"{name}: posture_costs[{i}]")
+        check_instance(term, PostureCost, f"{name}: posture_costs[{i}]")
     for what, box in (("joint_bounds", joint_bounds), ("velocity_bounds", velocity_bounds)):
         if box is not None:
-            instance(box, Box, f"{name}: {what}")
+            check_instance(box, Box, f"{name}: {what}")
 
 
 def _smoothness(

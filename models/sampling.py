@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ocp import Parameter, ParameterValues, ProblemError, Signal
+from ocp import Parameter, ProblemError, Signal
+from ocp.internal import ParameterValues
 
 _INSTANTS = 1001
 

@@ -13,7 +13,8 @@ from models.distance_cost import Combine, DistanceCost
 from models.obstacles import Disc, link_distances
 from models.paths import Path, line
 from models.redundancy import Cost, Form, redundancy_ocp
-from ocp import OCP, ProblemError, whole
+from ocp import OCP, ProblemError
+from ocp.internal import check_whole
 
 Difficulty = Literal["ordinary", "tight", "low gain", "infeasible"]
 
@@ -147,10 +148,10 @@ def random_scenarios(
     Raises:
         ProblemError: if an argument is out of its range.
     """
-    if not _LINKS[0] <= whole(links, "random scenarios: links") <= _LINKS[1]:
+    if not _LINKS[0] <= check_whole(links, "random scenarios: links") <= _LINKS[1]:
         raise ProblemError(f"random scenarios: links = {links!r}, it must be 3 to 12")
-    whole(count, "random scenarios: count")
-    whole(seed, "random scenarios: seed", least=0)
+    check_whole(count, "random scenarios: count")
+    check_whole(seed, "random scenarios: seed", least=0)
     if difficulty not in get_args(Difficulty):
         raise ProblemError(
             f"random scenarios: difficulty = {difficulty!r}, none of {get_args(Difficulty)}"

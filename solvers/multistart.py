@@ -5,18 +5,8 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import (
-    OCP,
-    Guess,
-    ProblemError,
-    Solution,
-    Solver,
-    evaluate,
-    instance,
-    not_negative,
-    positive,
-    whole,
-)
+from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
+from ocp.internal import check_instance, check_not_negative, check_positive, check_whole
 from solvers.indirect.indirect_shooting import IndirectShooting
 
 # Two answers whose true costs and states agree to this, relative, are the same optimum.
@@ -68,12 +58,12 @@ def multistart(
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
     """
-    instance(ocp, OCP, "multistart: ocp")
-    instance(solver, Solver, "multistart: solver")
-    whole(starts, "multistart: starts")
-    whole(seed, "multistart: seed", least=0)
-    positive(amplitude, "multistart: amplitude")
-    not_negative(violation, "multistart: violation", finite=False)
+    check_instance(ocp, OCP, "multistart: ocp")
+    check_instance(solver, Solver, "multistart: solver")
+    check_whole(starts, "multistart: starts")
+    check_whole(seed, "multistart: seed", least=0)
+    check_positive(amplitude, "multistart: amplitude")
+    check_not_negative(violation, "multistart: violation", finite=False)
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
     started = perf_counter()
@@ -101,10 +91,10 @@ def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> 
         amplitude: standard deviation of both parts, in the controls' own units (where a
             control is bounded, at most half its range).
     """
-    instance(ocp, OCP, "random_guesses: the problem")
-    whole(number, "random_guesses: number", least=0)
-    whole(seed, "random_guesses: seed", least=0)
-    positive(amplitude, "random_guesses: amplitude")
+    check_instance(ocp, OCP, "random_guesses: the problem")
+    check_whole(number, "random_guesses: number", least=0)
+    check_whole(seed, "random_guesses: seed", least=0)
+    check_positive(amplitude, "random_guesses: amplitude")
     rng = np.random.default_rng(seed)
     box, nu = ocp.control_bounds, ocp.model.nu
     with np.errstate(invalid="ignore"):

@@ -2,10 +2,11 @@
 
 from time import perf_counter
 
-from ocp import Solution, Status, UnsupportedProblem, Work, instance, positive
+from ocp import Solution, Status, UnsupportedProblem, Work
+from ocp.internal import check_instance, check_positive
 from solvers.direct.multiple_shooting import MultipleShooting
-from solvers.indirect.halved import change, finer
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
+from solvers.indirect.step_halving import change_when_halved, finer
 
 SEGMENTS, STEPS = 15, 300
 _MOST_STEPS = 2**16
@@ -42,10 +43,10 @@ def polish(
         UnsupportedProblem: if the minimum principle does not apply (path constraints, state
             bounds, a Hamiltonian linear in the control, a cost with kinks).
     """
-    positive(accuracy, "polish: accuracy")
-    instance(solution, Solution, "polish: solution")
+    check_positive(accuracy, "polish: accuracy")
+    check_instance(solution, Solution, "polish: solution")
     solver = solver or IndirectShooting(segments=SEGMENTS, steps=STEPS)
-    instance(solver, IndirectShooting, "polish: solver")
+    check_instance(solver, IndirectShooting, "polish: solver")
     ocp = solution.problem
     if ocp.smoothness == 0:
         raise UnsupportedProblem(
@@ -71,7 +72,7 @@ def _refined(
     """Double the steps until cost and states hold still, or say by how much they do not."""
     while result.status.is_success:
         half = finer(program)
-        moved = change(result, program, half)
+        moved = change_when_halved(result, program, half)
         result = result.with_(work=result.work + Work(rollouts=2))
         relative = moved.cost / (1.0 + abs(result.cost))
         if relative <= accuracy and moved.state <= _STATE * accuracy:

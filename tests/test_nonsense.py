@@ -16,13 +16,10 @@ from models import (
     CarimaPlant,
     CartPole,
     Disc,
-    bounded_ocp,
     carima_ocp,
     cart_pole_swing_up,
     cart_pole_upright,
     clearance_constraint,
-    discrete_double_integrator,
-    goddard,
     line,
     link_distances,
     lq_regulator,
@@ -39,6 +36,11 @@ from models import (
     thesis_regulator,
     thesis_tracking,
     tracking_ocp,
+)
+from models.textbook import (
+    bounded_ocp,
+    discrete_double_integrator,
+    goddard,
     unbounded_ocp,
     van_der_pol,
 )
@@ -46,41 +48,43 @@ from ocp import (
     MPC,
     OCP,
     RK4,
-    Applied,
     Box,
     Constraint,
+    FeedbackLaw,
     FlightRecorder,
     FreeTime,
     Guess,
-    Law,
     Model,
     Plant,
+    PlantInput,
     ProblemError,
     Rollout,
     Solution,
     Status,
-    Transcription,
-    assembled,
-    c_code,
     closed_loop,
-    compiled,
     costates_along,
-    curvature,
-    derive,
     discretise,
     evaluate,
-    hamiltonian,
     instantaneous,
     linear_quadratic,
+    minimum_principle,
     records,
     replay,
     saturated_lqr,
     solve,
-    start_fault,
-    stationary,
-    symbol_kind,
     with_input_rate,
     with_stationary_end,
+)
+from ocp.internal import (
+    Transcription,
+    c_code,
+    compiled,
+    differentiable_step,
+    hamiltonian,
+    stage_hessian,
+    start_violation,
+    stationary,
+    symbol_type,
 )
 from solvers import (
     GPC,
@@ -89,8 +93,8 @@ from solvers import (
     Axis,
     Batch,
     BetweenNodes,
+    CertifyOptions,
     Collocation,
-    Effort,
     FixedStep,
     Greedy,
     GridDP,
@@ -110,14 +114,13 @@ from solvers import (
     enumerate_extremals,
     gpc_loop,
     multistart,
-    raise_until_clear,
+    penalty_continuation,
     random_guesses,
-    refined,
+    refine_mesh,
     repel,
-    seeds_around,
-    self_motions,
     track,
 )
+from solvers.internal import seeds_around, self_motions
 
 
 @cache
@@ -132,7 +135,7 @@ def answer() -> Any:
 
 @cache
 def mesh() -> Any:
-    return refined(answer())
+    return refine_mesh(answer())
 
 
 def run(**data: Any) -> Solution:
@@ -142,6 +145,10 @@ def run(**data: Any) -> Solution:
 @cache
 def driver() -> MPC:
     return MPC(ocp=problem(), solver=MultipleShooting(10), dt=0.1, compiled=False)
+
+
+def plain_law() -> FeedbackLaw:
+    return FeedbackLaw(law=lambda x, t: [0.0])
 
 
 def loop(**changes: Any) -> Rollout:
@@ -194,7 +201,7 @@ def test_no_solver_builds_what_is_no_problem(make: Callable[[], Any]) -> None:
 
 CALLS: list[tuple[str, Wrong]] = [
     # Functions of a solution.
-    ("evaluate: solution is a Refinement, Solution is needed: its .solution is one",
+    ("evaluate: solution is a MeshRefinement, Solution is needed: its .solution is one",
      lambda: evaluate(mesh())),
     ("evaluate: solution is an OCP, Solution is needed$", lambda: evaluate(problem())),
     ("evaluate: solution is a NoneType", lambda: evaluate(*[None])),
@@ -204,9 +211,9 @@ CALLS: list[tuple[str, Wrong]] = [
     ("costates_along: solution is an OCP", lambda: costates_along(problem())),
     ("certify: solution is an OCP", lambda: certify(problem())),
     ("certify: effort is an int", lambda: certify(answer(), *[3])),
-    ("refined: start is an OCP", lambda: refined(problem())),
-    ("refined: solver is a MultipleShooting", lambda: refined(answer(), solver=ANY())),
-    ("refined: accuracy = 'x'", lambda: refined(answer(), **{"accuracy": "x"})),
+    ("refine_mesh: start is an OCP", lambda: refine_mesh(problem())),
+    ("refine_mesh: solver is a MultipleShooting", lambda: refine_mesh(answer(), solver=ANY())),
+    ("refine_mesh: accuracy = 'x'", lambda: refine_mesh(answer(), **{"accuracy": "x"})),
     # Functions of a problem and a solver.
     (r"solve: solver is the class MultipleShooting, Solver is needed: write MultipleShooting\(",
      lambda: solve(problem(), ANY)),
@@ -221,7 +228,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("multistart: amplitude", lambda: multistart(problem(), ANY(), 2, 0, amplitude=np.nan)),
     ("MPC of Van der Pol: dt .* = 'fast'",
      lambda: MPC(ocp=problem(), solver=ANY(10), **{"dt": "fast"})),
-    ("derive: the problem is an int", lambda: derive(*[3])),
+    ("minimum_principle: the problem is an int", lambda: minimum_principle(*[3])),
     ("hamiltonian: the problem is a Solution", lambda: hamiltonian(answer())),
     ("linear_quadratic: the problem is an int", lambda: linear_quadratic(*[3])),
     ("discretise: the problem is an int", lambda: discretise(*[3], 0.1)),
@@ -232,9 +239,9 @@ CALLS: list[tuple[str, Wrong]] = [
      lambda: solve(problem(), ANY(10), guess=np.zeros((3, 2)))),  # type: ignore[arg-type]
     ("the guess is <class 'numpy.ndarray'>", lambda: run(guess=np.zeros(2))),
     ("the guess is <class 'dict'>", lambda: run(guess={"x": 1})),
-    ("the guess is <class 'ocp.guess.Guess'>", lambda: run(guess=Guess)),
-    ("the guess is <class 'ocp.problem.OCP'>", lambda: run(guess=problem())),
-    ("the guess is <class 'ocp.guess.Guess'>", lambda: point(guess=Guess)),
+    ("the guess is <class 'ocp.problem.guess.Guess'>", lambda: run(guess=Guess)),
+    ("the guess is <class 'ocp.problem.ocp.OCP'>", lambda: run(guess=problem())),
+    ("the guess is <class 'ocp.problem.guess.Guess'>", lambda: point(guess=Guess)),
     ("the guess is <class 'numpy.ndarray'>", lambda: point(guess=np.zeros(3))),
     ("t0 = 'now'", lambda: run(t0="now")),
     ("t0 = None", lambda: run(t0=None)),
@@ -292,7 +299,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("axis: points must be a whole number of at least 3, not 3.0", lambda: Axis(0, 1, *[3.0])),
     ("GPC: weight = 'a'", lambda: GPC(**{"weight": "a"})),
     ("GPC: tolerance = 1.0, it must be positive, below 1", lambda: GPC(tolerance=1.0)),
-    ("certify: seconds = 'a'", lambda: Effort(**{"seconds": "a"})),
+    ("certify: seconds = 'a'", lambda: CertifyOptions(**{"seconds": "a"})),
     ("the place of constraints = 'terminl' is no place; 'path',",
      lambda: problem().at(*["terminl"])),
     # The loop.
@@ -314,19 +321,19 @@ CALLS: list[tuple[str, Wrong]] = [
      lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"parameters": {}})),
     ("the guess is <class 'str'>",
      lambda: MPC(ocp=problem(), solver=ANY(10), dt=0.1, **{"guess": "a"})),
-    ("applied: bounds is a tuple", lambda: Applied("rate", *[(-1.0, 1.0)])),
+    ("applied: bounds is a tuple", lambda: PlantInput("rate", *[(-1.0, 1.0)])),
     ("plant: saturation is a float", lambda: Plant(ocp=problem(), **{"saturation": 1.0})),
     ("plant: disturbance is a float", lambda: Plant(ocp=problem(), **{"disturbance": 1.0})),
-    ("law: law is a float, a function is needed", lambda: Law(**{"law": 1.0})),
-    (r"law: delay \[s\] = -1.0", lambda: Law(law=lambda x, t: [0.0], delay=-1.0)),
-    ("law: the plan to follow is an OCP", lambda: Law.following(*[problem()])),
+    ("law: law is a float, a function is needed", lambda: FeedbackLaw(**{"law": 1.0})),
+    (r"law: delay \[s\] = -1.0", lambda: FeedbackLaw(law=lambda x, t: [0.0], delay=-1.0)),
+    ("law: the plan to follow is an OCP", lambda: FeedbackLaw.following(*[problem()])),
     ("closed loop: controller is a MultipleShooting", lambda: loop(controller=ANY())),
     ("closed loop: controller is the class MPC, Controller is needed$",
      lambda: loop(controller=MPC)),
     ("closed loop: plant is an OCP", lambda: loop(plant=problem())),
     (r"closed loop: duration \[s\] = 'a'", lambda: loop(duration="a")),
     ("closed loop: watch is an int, a function is needed", lambda: loop(watch=3)),
-    ("flight recorder: mpc is a Law", lambda: FlightRecorder(*[Law(law=lambda x, t: [0.0])], "f")),
+    ("flight recorder: mpc is a FeedbackLaw", lambda: FlightRecorder(*[plain_law()], "f")),
     ("the path of a flight record is an int", lambda: FlightRecorder(driver(), *[3])),
     ("the flight record .* cannot be written: No such", lambda: FlightRecorder(driver(), NOWHERE)),
     ("the flight record .* cannot be read: No such", lambda: next(records(NOWHERE))),
@@ -340,11 +347,11 @@ CALLS: list[tuple[str, Wrong]] = [
      lambda: with_input_rate(thesis_tracking(3), **{"rate": 1.0})),
     ("instantaneous: the problem is an int", lambda: instantaneous(*[3])),
     ("saturated_lqr: the problem is an int", lambda: saturated_lqr(*[3])),
-    ("start_fault: the problem is an int", lambda: start_fault(*[3], answer().data)),
-    ("curvature: the problem is an int", lambda: curvature(*[3], RK4())),
-    ("assembled: the problem is an int", lambda: assembled(*[3], RK4())),
+    ("start_fault: the problem is an int", lambda: start_violation(*[3], answer().data)),
+    ("stage_hessian: the problem is an int", lambda: stage_hessian(*[3], RK4())),
+    ("differentiable_step: the problem is an int", lambda: differentiable_step(*[3], RK4())),
     ("hamiltonian: the problem is a ndarray", lambda: hamiltonian(*[np.zeros(2)])),
-    ("symbol_kind: the function is an SX", lambda: symbol_kind(*[ca.SX.sym("x")])),
+    ("symbol_kind: the function is an SX", lambda: symbol_type(*[ca.SX.sym("x")])),
     ("compiled: the function is an OCP", lambda: compiled(*[problem()])),
     ("c_code: the function is an int", lambda: c_code(*[3])),
     ("enumerate_extremals: the problem is an int", lambda: enumerate_extremals(*[3])),
@@ -355,7 +362,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("self_motions: manifold is an int", lambda: self_motions(*[3], [])),
     ("seeds_around: manifold is an int", lambda: seeds_around(*[3], np.zeros(2))),
     ("raise until clear: soft is an int",
-     lambda: raise_until_clear(*[3], problem(), ANY(), parameter="k")),
+     lambda: penalty_continuation(*[3], problem(), ANY(), parameter="k")),
     ("mesh: edges is an int", lambda: Mesh(*[3], (3,))),
     ("mesh: edge = 'a'", lambda: Mesh(*[("a", 1.0)], (3,))),
     ("axis: lower = None", lambda: Axis(*[None], 1.0, 5)),

@@ -15,7 +15,7 @@ from benchmarks.commands.command import Command
 from benchmarks.commands.options import named, positive
 from benchmarks.sweep.row import versions
 from ocp import OCPError
-from solvers import Effort
+from solvers import CertifyOptions
 
 _SUITE = "library"
 
@@ -31,7 +31,7 @@ def _options(parser: ArgumentParser) -> None:
 def _run(options: Namespace, console: Console) -> int:
     try:
         on_file = Certificates.read(options.file)
-        effort = Effort(starts=options.starts, seed=options.seed)
+        effort = CertifyOptions(starts=options.starts, seed=options.seed)
     except (ValueError, OCPError) as reason:
         print(reason, file=sys.stderr)
         return 2

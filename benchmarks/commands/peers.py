@@ -15,7 +15,7 @@ from benchmarks.peers import (
     BadResults,
     Environment,
     InstallFailed,
-    Report,
+    PeerReport,
     compare,
     markdown,
     quicker,
@@ -103,7 +103,7 @@ def _compare(options: Namespace, console: Console) -> int:
 
 def _show(file: Path) -> int:
     try:
-        print(markdown(Report.read(file)))
+        print(markdown(PeerReport.read(file)))
     except BadResults as reason:
         print(reason, file=sys.stderr)
         return 2

@@ -9,7 +9,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from benchmarks.cases import arm_scenario
 from benchmarks.figures.drawing import Drawing, label, sheet
-from ocp import OCP, RK4, derive
+from ocp import OCP, RK4, minimum_principle
 from solvers import enumerate_extremals
 
 _SCENARIO = "arm-001"
@@ -118,7 +118,7 @@ def _marks(axes: Axes, optimum: float, guess: tuple[float, float]) -> None:
 
 def _end_costates(ocp: OCP) -> ca.Function:
     """psi(t0) -> psi(t1), from the given start."""
-    flow, nx = derive(ocp).flow, ocp.model.nx
+    flow, nx = minimum_principle(ocp).flow, ocp.model.nx
     z, t = ca.SX.sym("z", 2 * nx), ca.SX.sym("t")
     h, p = ocp.duration / _STEPS, ocp.parameter_values().at(0.0)[0]
     after = RK4()(lambda y, s: h * flow(y, t + h * s, p), z, 0.0, 1.0)

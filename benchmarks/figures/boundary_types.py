@@ -10,16 +10,8 @@ from benchmarks.figures.drawing import COLOURS, Drawing, label, sheet
 from benchmarks.figures.scanned import columns, rows, transversality
 from models import redundancy_ocp
 from ocp import OCP, solve
-from solvers import (
-    Enumeration,
-    Kept,
-    MultipleShooting,
-    ReverseShooting,
-    SelfMotion,
-    enumerate_extremals,
-    seeds_around,
-    self_motions,
-)
+from solvers import Enumeration, MultipleShooting, ReverseShooting, enumerate_extremals
+from solvers.internal import InvariantManifold, SelfMotion, seeds_around, self_motions
 
 _SCENARIO = "arm-001"
 _POSTURES = 15
@@ -119,7 +111,7 @@ def _number(found: Enumeration) -> str:
 
 
 def _curves(ocp: OCP) -> tuple[SelfMotion, ...]:
-    end = Kept.of(ocp).at(ocp.duration, ocp.parameter_values().at(1.0)[0])
+    end = InvariantManifold.of(ocp).at(ocp.duration, ocp.parameter_values().at(1.0)[0])
     return self_motions(end, seeds_around(end, np.asarray(ocp.x0)))
 
 

@@ -4,15 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from benchmarks.figures.drawing import COLOURS, REFERENCE, Drawing, held, label, sheet
-from benchmarks.mpc.cart_pole_loop import (
-    CUSHION,
-    DT,
-    FORCE,
-    TRACK,
-    Setting,
-    loop,
-    up_since,
-)
+from benchmarks.mpc.cart_pole_loop import CUSHION, DT, FORCE, TRACK, Setting, loop, up_since
 from models import CartPole
 from ocp import Rollout
 

@@ -10,9 +10,10 @@ from matplotlib.patches import Circle
 
 from benchmarks.cases import arm_scenario, soft_optimum
 from benchmarks.figures.drawing import COLOURS, FINITE, REFERENCE, Drawing, label, sheet
-from models import BarrierCost, DistanceCost, bounded_ocp, link_distances, unbounded_ocp
+from models import DistanceCost, link_distances
+from models.textbook import BarrierCost, bounded_ocp, unbounded_ocp
 from ocp import Solution, Status, evaluate, solve
-from solvers import BetweenNodes, IndirectShooting, MultipleShooting, Schuetz, raise_until_clear
+from solvers import BetweenNodes, IndirectShooting, MultipleShooting, Schuetz, penalty_continuation
 
 SCENARIO = "arm-011"
 # A price of collision that is paid, as a share of the scenario's own.
@@ -20,7 +21,7 @@ _LOW = 1e-3
 _BARRIER = 1e-3  # [m^2]
 
 
-class _Runs(NamedTuple):
+class _CollisionRuns(NamedTuple):
     broken: tuple[Status, Status]
     paid: Solution
     raised: Solution
@@ -47,7 +48,7 @@ def costs() -> Drawing:
 
 
 @cache
-def _runs() -> _Runs:
+def _runs() -> _CollisionRuns:
     scenario = arm_scenario(SCENARIO)
     barrier, soft = unbounded_ocp(scenario, gain=_BARRIER), bounded_ocp(scenario)
     hard = scenario.ocp(weight=0.0, clearance=scenario.radius)
@@ -58,8 +59,10 @@ def _runs() -> _Runs:
     direct, start = MultipleShooting(75), soft_optimum(SCENARIO)
     program = direct.build(soft)
     paid = program.run(parameters={"weight": _LOW})
-    raised = raise_until_clear(bounded_ocp(scenario, weight=_LOW), hard, direct, parameter="weight")
-    return _Runs(broken, paid, raised, solve(hard, BetweenNodes(direct), guess=start))
+    raised = penalty_continuation(
+        bounded_ocp(scenario, weight=_LOW), hard, direct, parameter="weight"
+    )
+    return _CollisionRuns(broken, paid, raised, solve(hard, BetweenNodes(direct), guess=start))
 
 
 def _draw_arm(axes: Axes, solution: Solution, title: str) -> None:
@@ -99,7 +102,7 @@ def _distance(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     return truth.t, np.array(closest.map(len(truth.t))(truth.x.T)).ravel()
 
 
-def _sentence(runs: _Runs) -> str:
+def _sentence(runs: _CollisionRuns) -> str:
     schuetz, shooting = runs.broken
     radius = arm_scenario(SCENARIO).radius
     deep, clear, least = (_distance(s)[1].min() for s in (runs.paid, runs.raised, runs.hard))

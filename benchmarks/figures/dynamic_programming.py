@@ -7,7 +7,8 @@ from matplotlib.colors import PowerNorm
 
 from benchmarks.figures.drawing import FINITE, Drawing, label, sheet
 from ocp import OCP, Box, Constraint, Model
-from solvers import GridDP, Table
+from solvers import GridDP
+from solvers.internal import ValueFunction
 
 _GROWTH, _INPUT, _TARGET, _STEPS, _RANGE = 1.2, 1.0, 0.5, 6, 5.0
 _STATE_WEIGHT = 0.05
@@ -70,7 +71,7 @@ def _reach() -> list[float]:
     return widths
 
 
-def _field(axes: Axes, table: Table, x: np.ndarray) -> None:
+def _field(axes: Axes, table: ValueFunction, x: np.ndarray) -> None:
     values = np.where(table.reachable, table.field, np.nan).T
     edges = np.arange(_STEPS + 2) - 0.5
     half = 0.5 * (x[1] - x[0])
@@ -82,7 +83,7 @@ def _field(axes: Axes, table: Table, x: np.ndarray) -> None:
     label(axes, "step k", "state x", "cost-to-go J by colour (white: no way to the target)")
 
 
-def _columns(table: Table, x: np.ndarray) -> dict[str, np.ndarray]:
+def _columns(table: ValueFunction, x: np.ndarray) -> dict[str, np.ndarray]:
     columns = {"x [-]": x}
     for k in range(_STEPS + 1):
         columns[f"J_{k} [-]"] = table.field[k]

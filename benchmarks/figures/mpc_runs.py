@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from models import sinusoid, thesis_tracking
-from ocp import MPC, Law, Outcome, Plant, Rollout, SolverError, closed_loop, solve
+from ocp import MPC, FeedbackLaw, InputSource, Plant, Rollout, SolverError, closed_loop, solve
 from solvers import LinearMPC
 
 HORIZONS = (5, 10, 20, 40)
@@ -44,7 +44,7 @@ def receding(
     )
     run = mpc.run(_plant(dt, moving), np.zeros(2), duration).or_raise()
     # A figure of the optimal control law has no place for another rung of the ladder.
-    worse = next((d for d in run.decisions if d.outcome is not Outcome.OPTIMAL), None)
+    worse = next((d for d in run.decisions if d.outcome is not InputSource.OPTIMAL), None)
     if worse is not None:
         raise SolverError(f"N = {steps}, t = {worse.t:g} s: {worse.outcome.name}, {worse.message}")
     return run
@@ -54,7 +54,7 @@ def receding(
 def finite(*, dt: float = 0.05, moving: bool = True, duration: float = DURATION) -> Rollout:
     """Return the whole duration as one problem, its inputs fed forward: horizon 0 of the thesis."""
     plan = solve(thesis_tracking(round(duration / dt), dt=dt, moving=moving), LinearMPC())
-    law = Law.following(plan.or_raise())
+    law = FeedbackLaw.following(plan.or_raise())
     return closed_loop(law, _plant(dt, moving), plan.x0, duration, dt=dt).or_raise()
 
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from benchmarks.figures.drawing import COLOURS, FINITE, Drawing, held, label, sheet
 from models import LinearPlant, stable_plant, thesis_regulator, unstable_plant
-from ocp import Law, Plant, Rollout, closed_loop, solve
+from ocp import FeedbackLaw, Plant, Rollout, closed_loop, solve
 from solvers import Batch, Riccati
 
 _STEPS = 50
@@ -67,8 +67,8 @@ def _pair(plant: LinearPlant) -> _Pair:
     ocp, dt = thesis_regulator(plant, _STEPS), plant.model.dt or 0.0
     planned, gains = solve(ocp, Batch()), Riccati().build(ocp).K
     laws = (
-        Law.following(planned),
-        Law(law=lambda x, t: -gains[round(t / dt)] @ x),
+        FeedbackLaw.following(planned),
+        FeedbackLaw(law=lambda x, t: -gains[round(t / dt)] @ x),
     )
     batch, recursive = (
         closed_loop(law, Plant(ocp=ocp), planned.x0, _STEPS * dt, dt=dt).or_raise() for law in laws

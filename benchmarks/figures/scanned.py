@@ -5,7 +5,8 @@ from matplotlib.axes import Axes
 
 from benchmarks.figures.drawing import COLOURS, FINITE, label
 from ocp import Solution
-from solvers import Enumeration, Kept, Scan
+from solvers import Enumeration
+from solvers.internal import InvariantManifold, Scan
 
 PLACE = "place of θ(t_1) on its self-motion, arclength [rad]"
 
@@ -14,7 +15,7 @@ def transversality(found: Enumeration) -> np.ndarray:
     """‖N ψ(t0)‖ at every point of the scan."""
     (scan,) = found.scans
     ocp = found.solutions[0].problem
-    start = Kept.of(ocp).at(0.0, ocp.parameter_values().at(0.0)[0])
+    start = InvariantManifold.of(ocp).at(0.0, ocp.parameter_values().at(0.0)[0])
     rows = zip(scan.starts, scan.costates, strict=True)
     return np.array([np.linalg.norm(start.projector(x) @ psi) for x, psi in rows])
 

@@ -24,7 +24,7 @@ _POSTURES = 7
 _COLOURS = (FINITE, COLOURS[1], COLOURS[3], "black")
 
 
-class _Motion(NamedTuple):
+class _ArmMotion(NamedTuple):
     """The referee's view: instants (K,), angles (K, 3), closest link (K,), and the cost."""
 
     t: np.ndarray
@@ -63,7 +63,7 @@ def together() -> Drawing:
     return Drawing(picture, columns, _sentence(motions, from_zero), film)
 
 
-def _motions(scenario: ArmScenario) -> tuple[dict[str, _Motion], _Motion]:
+def _motions(scenario: ArmScenario) -> tuple[dict[str, _ArmMotion], _ArmMotion]:
     """Return what is drawn, and where shooting ends from costates zero."""
     ocp, tuned = scenario.ocp(_COMBINE), tuned_kinematics(scenario, _COMBINE)
     assert tuned is not None  # on this scenario candidates stay on the path
@@ -78,15 +78,15 @@ def _motions(scenario: ArmScenario) -> tuple[dict[str, _Motion], _Motion]:
     return motions, _seen(scenario, solve(ocp, shooting))
 
 
-def _seen(scenario: ArmScenario, solution: Solution) -> _Motion:
+def _seen(scenario: ArmScenario, solution: Solution) -> _ArmMotion:
     verdict, theta = evaluate(solution), ca.SX.sym("theta", scenario.arm.n)
     truth, closest = verdict.truth, ca.mmin(link_distances(scenario.arm, theta, scenario.disc))
     distance = ca.Function("d", [theta], [closest]).map(len(truth.t))(truth.x.T)
     status = solution.status.name
-    return _Motion(truth.t, truth.x, np.array(distance).ravel(), verdict.cost, status)
+    return _ArmMotion(truth.t, truth.x, np.array(distance).ravel(), verdict.cost, status)
 
 
-def _draw_arm(axes: Axes, scenario: ArmScenario, motion: _Motion, name: str) -> None:
+def _draw_arm(axes: Axes, scenario: ArmScenario, motion: _ArmMotion, name: str) -> None:
     instants = np.linspace(0.0, scenario.horizon, _POSTURES)
     rows = np.stack([np.interp(instants, motion.t, row) for row in motion.theta.T], axis=1)
     draw_obstacles(axes, (scenario.disc,), scenario.influence)
@@ -95,7 +95,7 @@ def _draw_arm(axes: Axes, scenario: ArmScenario, motion: _Motion, name: str) -> 
     axes.set_title(f"{name}: {motion.cost:.3f}", fontsize=10)
 
 
-def _sentence(motions: dict[str, _Motion], from_zero: _Motion) -> str:
+def _sentence(motions: dict[str, _ArmMotion], from_zero: _ArmMotion) -> str:
     best = motions["optimum"].cost
     told = [
         f"{name} costs {motion.cost:.4f} ({100.0 * (motion.cost / best - 1.0):+.1f} %, "

@@ -6,13 +6,7 @@ from functools import lru_cache
 from benchmarks.cases import Case, soft_optimum
 from benchmarks.methods.method import Method, Outcome, Settings
 from ocp import OCP, Solver, evaluate, solve
-from solvers import (
-    AugmentedLagrangian,
-    BetweenNodes,
-    IndirectShooting,
-    MultipleShooting,
-    Schuetz,
-)
+from solvers import AugmentedLagrangian, BetweenNodes, IndirectShooting, MultipleShooting, Schuetz
 
 _INTERVALS = 75
 # A large penalty makes the canonical flow stiff: a segment an interval, four steps a segment.

@@ -15,7 +15,7 @@ from solvers import (
     Schuetz,
     StagewiseNewton,
     polish,
-    refined,
+    refine_mesh,
 )
 
 SUITE = "library"
@@ -57,7 +57,7 @@ def _indirect(case: Case, settings: Settings) -> Outcome:
 
 
 def _collocation(case: Case, settings: Settings) -> Outcome:
-    return judged(refined(_coarse(case), solver=FIRST_MESH, accuracy=DEFECT).solution)
+    return judged(refine_mesh(_coarse(case), solver=FIRST_MESH, accuracy=DEFECT).solution)
 
 
 def _extremal(case: Case, settings: Settings) -> Outcome:

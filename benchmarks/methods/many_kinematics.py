@@ -6,8 +6,10 @@ import casadi as ca
 import numpy as np
 
 from models import ArmScenario, link_distances
-from ocp import OCP, RK4, Stage
-from solvers import Filtered, Level, PrioritisedKinematics, Repulsion, prioritised_velocity
+from ocp import OCP, RK4
+from ocp.internal import Stage
+from solvers import Filtered, PrioritisedKinematics, Repulsion
+from solvers.internal import Level, prioritised_velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +19,7 @@ class ManyKinematics:
     Attributes:
         scenario: what to control.
         ocp: the same in velocity form; its running cost is what counts.
-        levels: (q, t, gains) -> J and demand of the path, J and demand of the repulsion, its
+        levels: (q, t, gains) -> J and desired velocity of the path, the same of the repulsion, its
             activation, norm of the path error. The gains are v0 [m/s], d_m [m], d_i [m].
         stage: one sampling interval of the problem.
     """
@@ -45,7 +47,7 @@ class ManyKinematics:
             [track.q, track.t, ca.vertcat(*gains)],
             [
                 track.jacobian,
-                track.demand,
+                track.desired_velocity,
                 ca.densify(ca.jacobian(distance, track.q)),
                 v0 * repulsion.velocity_gain(distance),
                 repulsion.homogeneous_gain(distance),

@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Mistake
 from ocp import Box, Constraint, FreeTime
-from solvers import Cause
+from solvers.internal import Cause
 
 AFTERWARDS = (
     Mistake(

@@ -14,7 +14,7 @@ GOAL = 0.8
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """What came out for one problem.
 
     Attributes:
@@ -38,20 +38,20 @@ class Verdict:
         return self.entry.symbol in first.where
 
 
-def judged(entries: Sequence[Mistake | Sound]) -> Iterator[Verdict]:
+def judged(entries: Sequence[Mistake | Sound]) -> Iterator[Judgement]:
     """Diagnose one problem after the other, each once."""
     for entry in entries:
         ocp, started = entry.build(), perf_counter()
         diagnosis = diagnose(ocp)
-        yield Verdict(entry, diagnosis, perf_counter() - started)
+        yield Judgement(entry, diagnosis, perf_counter() - started)
 
 
-def share(verdicts: Sequence[Verdict]) -> float:
+def share(verdicts: Sequence[Judgement]) -> float:
     """Return how many are right, of 1."""
     return sum(v.is_right for v in verdicts) / max(len(verdicts), 1)
 
 
-def verdict_table(verdicts: Sequence[Verdict]) -> Table:
+def verdict_table(verdicts: Sequence[Judgement]) -> Table:
     """Return one row for each problem: what was planted, what was found first."""
     table = Table(title="seeded mistakes and what diagnose says first")
     for column in ("problem", "planted", "symbol", "first", "named", "held out", "right", "s"):
@@ -65,12 +65,12 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     return table
 
 
-def _marked(verdict: Verdict) -> str:
+def _marked(verdict: Judgement) -> str:
     first = verdict.diagnosis.first
     return "" if first is None else f"{first.cause.name} ({first.severity.name.lower()})"
 
 
-def summary_table(verdicts: Sequence[Verdict]) -> Table:
+def summary_table(verdicts: Sequence[Judgement]) -> Table:
     """Return the shares: all, tuned on, held out; mistakes and sound problems apart."""
     table = Table(title="named first; sound problems without a false alarm")
     for column in ("", "mistakes", "named first", "sound", "false alarms"):

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ocp import OCP
-from solvers import Cause
+from solvers.internal import Cause
 
 
 @dataclass(frozen=True)

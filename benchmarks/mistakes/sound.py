@@ -4,16 +4,14 @@ from benchmarks.cases import arm_scenario
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Sound
 from benchmarks.questions.greedy_gap import mass_regulator
-from models import (
+from models import stable_plant, thesis_regulator, unstable_plant
+from models.textbook import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_energy,
     double_integrator_minimum_time,
     hypersensitive,
     rayleigh,
-    stable_plant,
-    thesis_regulator,
-    unstable_plant,
     van_der_pol,
 )
 

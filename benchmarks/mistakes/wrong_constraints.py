@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Mistake
 from ocp import Box, Constraint, Guess
-from solvers import Cause
+from solvers.internal import Cause
 
 CAR_ENDS = of.ends({"x": 10.0, "y": 0.0, "speed": 0.0})
 

@@ -5,7 +5,7 @@ import casadi as ca
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Mistake
 from ocp import Box, Constraint, FreeTime, Parameter
-from solvers import Cause
+from solvers.internal import Cause
 
 FREE = Box()
 

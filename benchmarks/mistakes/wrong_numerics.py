@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.mistake import Mistake
 from ocp import Box, Signal
-from solvers import Cause
+from solvers.internal import Cause
 
 _HALF = np.linspace(1.0, 0.0, 21)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from ocp import OCP, Program, Solution, Solver, Start
+from ocp import OCP, InitialGuess, Program, Solution, Solver
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class AlteredProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve, and change the answer."""
         answer = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)

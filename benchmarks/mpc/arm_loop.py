@@ -15,7 +15,19 @@ import casadi as ca
 
 from benchmarks.methods.tuned_kinematics import instantaneous, tuned_kinematics
 from models import ArmScenario, DistanceCost, Path, redundancy_ocp
-from ocp import MPC, OCP, Applied, Box, Law, Plant, Rollout, Solution, Solver, closed_loop, solve
+from ocp import (
+    MPC,
+    OCP,
+    Box,
+    FeedbackLaw,
+    Plant,
+    PlantInput,
+    Rollout,
+    Solution,
+    Solver,
+    closed_loop,
+    solve,
+)
 from solvers import (
     FixedStep,
     IndirectShooting,
@@ -91,7 +103,7 @@ def controller(kind: str, ocp: OCP, **options: float) -> MPC:
         ocp=ocp,
         solver=SOLVERS[kind](intervals(ocp.duration)),
         dt=DT,
-        applied=Applied("rate", JOINTS),
+        applied=PlantInput("rate", JOINTS),
         guess=_first(ocp) if kind == "shooting" else None,
         delay=options.get("delay", 0.0),
         compensate=bool(options.get("compensate", True)),
@@ -108,10 +120,10 @@ def tuned(scenario: ArmScenario) -> Repulsion:
     return tuned_kinematics(scenario, "sum").repulsion
 
 
-def law(scenario: ArmScenario, repulsion: Repulsion) -> Law:
+def law(scenario: ArmScenario, repulsion: Repulsion) -> FeedbackLaw:
     """Return instantaneous control (3.19) in the same loop, with the same feedback K."""
     program = instantaneous(scenario, repulsion, feedback=CORRECTION).build()
-    return Law(law=program.velocity, bounds=JOINTS)
+    return FeedbackLaw(law=program.velocity, bounds=JOINTS)
 
 
 def loop(scenario: ArmScenario, kind: str, horizon: float) -> Rollout:

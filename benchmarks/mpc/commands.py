@@ -14,7 +14,7 @@ from benchmarks.cases import arm_scenario
 from benchmarks.mpc import cart_pole_loop as cart_pole
 from benchmarks.mpc.dial import HORIZONS, crossings_table, sweep
 from benchmarks.mpc.endings import ENDINGS, loop_with
-from benchmarks.mpc.faults import SUBJECTS, Report, campaign
+from benchmarks.mpc.faults import SUBJECTS, FaultReport, campaign
 from benchmarks.mpc.late import DELAY, delayed_loops
 from benchmarks.mpc.loop_row import LoopRow
 from benchmarks.mpc.mass_loop import DT, receding
@@ -115,7 +115,7 @@ def print_faults(console: Console, steps: int, seed: int, workers: int = 1) -> i
 
 def _pieces(
     console: Console, name: str, steps: int, seed: int, pool: ProcessPoolExecutor
-) -> Iterator[Report]:
+) -> Iterator[FaultReport]:
     """Yield the reports of a campaign's pieces, with a bar of how many steps are done."""
     with Progress(console=console, transient=True) as bar:
         task = bar.add_task(f"{name}, {steps} steps", total=steps)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from benchmarks.mpc.altered import Altered
 from benchmarks.mpc.faulty import Fault, Schedule, Spoiled, active
 from models import Disc, DistanceCost, PlanarArm, redundancy_ocp
-from ocp import MPC, OCP, Applied, Box, Constraint, Model, Parameter, Plant
+from ocp import MPC, OCP, Box, Constraint, Model, Parameter, Plant, PlantInput
 from solvers import MultipleShooting, PrioritisedKinematics, track
 
 MISMATCH = 0.3
@@ -21,7 +21,12 @@ _NOWHERE = 50.0  # [m], for the cart
 _OUT_OF_REACH = 2.0  # [m], for the arm
 # A step that has to answer in time gives up early; fatrop alone would sometimes never do so.
 _SOLVER = MultipleShooting(
-    8, backend="fatrop", max_iterations=40, compiled=True, time_limit=1.0, rescue=False
+    8,
+    backend="fatrop",
+    max_iterations=40,
+    compiled=True,
+    time_limit=1.0,
+    feasibility_restoration=False,
 )
 _START, _FAR = (2.0, -1.0, -1.0), (5.0, 5.0)
 # Beside the elbow, where the arm can give way, and on the path, where it cannot.
@@ -32,7 +37,7 @@ _GAIN = ca.SX.sym("gain")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Subject:
+class FaultProblem:
     """What a campaign is run on.
 
     Attributes:
@@ -46,7 +51,7 @@ class Subject:
     x0: tuple[float, ...]
 
 
-def cart(faults: Schedule) -> Subject:
+def cart(faults: Schedule) -> FaultProblem:
     """Return a cart of 1 kg that goes to and fro between targets.
 
     |force| <= 2 N, |speed| <= 1.5 m/s, a wall that it must not pass, and it must get within
@@ -76,7 +81,7 @@ def cart(faults: Schedule) -> Subject:
         blocked = fault is not None and fault.kind == "obstacle"
         return {"target": _NOWHERE if away else usual, "wall": -2.0 if blocked else 10.0}
 
-    return Subject(
+    return FaultProblem(
         mpc=MPC(
             ocp=ocp,
             solver=Altered(_SOLVER, Spoiled(dt, faults)),
@@ -89,7 +94,7 @@ def cart(faults: Schedule) -> Subject:
     )
 
 
-def arm(faults: Schedule) -> Subject:
+def arm(faults: Schedule) -> FaultProblem:
     """Return an arm that swings its end effector to and fro, a disc beside it.
 
     No link may come closer than 0.15 m to the disc, no joint turn faster than 6 rad/s. The
@@ -129,12 +134,12 @@ def arm(faults: Schedule) -> Subject:
             disc = _IN_THE_WAY if fault.size > 0.0 else _BESIDE
         return {"offset": _OUT_OF_REACH if away else 0.0, "center": disc}
 
-    return Subject(
+    return FaultProblem(
         mpc=MPC(
             ocp=ocp,
             solver=Altered(_SOLVER, Spoiled(dt, faults)),
             dt=dt,
-            applied=Applied("rate", Box(-_JOINTS, _JOINTS)),
+            applied=PlantInput("rate", Box(-_JOINTS, _JOINTS)),
             backup=backup.velocity,
             parameters=lambda t: wanted(t, active(faults, t, dt)),
         ),

@@ -11,11 +11,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.mpc.fault_problems import Subject, arm, cart
+from benchmarks.mpc.fault_problems import FaultProblem, arm, cart
 from benchmarks.mpc.faulty import NEVER_OPTIMAL, Hindered, Schedule, active, schedule
-from ocp import FlightRecorder, Outcome, Rollout, closed_loop, replay_all
+from ocp import FlightRecorder, InputSource, Rollout, closed_loop, replay_all
 
-SUBJECTS: Mapping[str, Callable[[Schedule], Subject]] = {"cart": cart, "arm": arm}
+SUBJECTS: Mapping[str, Callable[[Schedule], FaultProblem]] = {"cart": cart, "arm": arm}
 # Steps in one loop and one flight record.
 PIECE = 500
 # Steps after a fault within which a decision is optimal again.
@@ -23,7 +23,7 @@ RECOVERY = 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class FaultReport:
     """What a campaign on one subject found; all but the counts should be zero.
 
     Attributes:
@@ -43,7 +43,7 @@ class Report:
     subject: str
     steps: int
     faults: Counter[str]
-    outcomes: Counter[tuple[str, Outcome]]
+    outcomes: Counter[tuple[str, InputSource]]
     bad_inputs: int
     unnamed: int
     lies: int
@@ -58,10 +58,10 @@ class Report:
         found = (self.bad_inputs, self.unnamed, self.lies, self.slow, self.refused, self.differing)
         return not any(found)
 
-    def __add__(self, other: "Report") -> "Report":
+    def __add__(self, other: "FaultReport") -> "FaultReport":
         """Return both as one."""
         mine, yours = vars(self), vars(other)
-        return Report(
+        return FaultReport(
             subject=self.subject,
             **{name: mine[name] + yours[name] for name in mine if name != "subject"},
         )
@@ -69,7 +69,7 @@ class Report:
 
 def campaign(
     subject: str, steps: int, *, seed: int = 0, executor: Executor | None = None
-) -> Iterator[Report]:
+) -> Iterator[FaultReport]:
     """Run the loop for a number of steps, in pieces with their own random numbers.
 
     Args:
@@ -86,7 +86,7 @@ def campaign(
     yield from run(partial(_piece, subject), counts, count(seed))
 
 
-def _piece(name: str, steps: int, seed: int) -> Report:
+def _piece(name: str, steps: int, seed: int) -> FaultReport:
     faults = schedule(steps, seed)
     subject = SUBJECTS[name](faults)
     mpc, hindered = subject.mpc, Hindered(subject.mpc, faults)
@@ -97,28 +97,28 @@ def _piece(name: str, steps: int, seed: int) -> Report:
                 hindered, subject.plant, subject.x0, steps * mpc.dt,
                 dt=mpc.dt, seed=seed, sensors=hindered.sensors, watch=recorder.watch,
             )  # fmt: skip
-        failed = [k for k, o in enumerate(rollout.outcomes) if o is not Outcome.OPTIMAL]
+        failed = [k for k, o in enumerate(rollout.outcomes) if o is not InputSource.OPTIMAL]
         again = [replayed.is_exact for replayed in replay_all(mpc, file, failed)]
     return _judged(name, subject, faults, rollout, again)
 
 
 def _judged(
-    name: str, subject: Subject, faults: Schedule, rollout: Rollout, again: list[bool]
-) -> Report:
+    name: str, subject: FaultProblem, faults: Schedule, rollout: Rollout, again: list[bool]
+) -> FaultReport:
     box = subject.mpc.applied.box(subject.mpc.ocp)
     dt, decisions = subject.mpc.dt, rollout.decisions
     inputs = np.array([d.input for d in decisions])
     at = [active(faults, d.t, dt) for d in decisions]
     kinds = [fault.kind if fault else "none" for fault in at]
-    return Report(
+    return FaultReport(
         subject=name,
         steps=len(decisions),
         faults=Counter(fault.kind for fault in faults),
         outcomes=Counter((kind, d.outcome) for kind, d in zip(kinds, decisions, strict=True)),
         bad_inputs=int((~np.isfinite(inputs) | (box.excess(inputs) > 0.0)).any(axis=1).sum()),
-        unnamed=sum(d.outcome is not Outcome.OPTIMAL and not d.message for d in decisions),
+        unnamed=sum(d.outcome is not InputSource.OPTIMAL and not d.message for d in decisions),
         lies=sum(
-            kind in NEVER_OPTIMAL and d.outcome is Outcome.OPTIMAL
+            kind in NEVER_OPTIMAL and d.outcome is InputSource.OPTIMAL
             for kind, d in zip(kinds, decisions, strict=True)
         ),
         slow=sum(_is_slow(rollout, fault.last + 1) for fault in faults),
@@ -131,4 +131,4 @@ def _judged(
 def _is_slow(rollout: Rollout, first: int) -> bool:
     """Whether none of the calm steps after a fault is optimal."""
     after = rollout.outcomes[first : first + RECOVERY]
-    return len(after) == RECOVERY and Outcome.OPTIMAL not in after
+    return len(after) == RECOVERY and InputSource.OPTIMAL not in after

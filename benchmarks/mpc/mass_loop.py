@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from models import sinusoid, thesis_tracking
-from ocp import MPC, OCP, Box, Law, Plant, Rollout, closed_loop, solve
+from ocp import MPC, OCP, Box, FeedbackLaw, Plant, Rollout, closed_loop, solve
 from solvers import LinearMPC
 
 DT, STEPS = 0.05, 80
@@ -51,5 +51,5 @@ def receding(horizon: int, load: float = 0.0, *, bounded: bool = False) -> Rollo
 def feed_forward(load: float = 0.0, *, bounded: bool = False) -> Rollout:
     """Return the loop in which one plan for all steps is played back."""
     plan = solve(problem(STEPS, bounded=bounded), LinearMPC()).or_raise()
-    law = Law(law=lambda x, t: plan.u[round(t / DT)])
+    law = FeedbackLaw(law=lambda x, t: plan.u[round(t / DT)])
     return closed_loop(law, plant(load, bounded=bounded), _REST, STEPS * DT, dt=DT)

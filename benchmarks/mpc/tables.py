@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from benchmarks.mpc.faults import Report
+from benchmarks.mpc.faults import FaultReport
 from benchmarks.mpc.faulty import KINDS
 from benchmarks.mpc.loop_row import LoopRow
-from ocp import Outcome
+from ocp import InputSource
 
 
 def _number(value: float | None, form: str) -> str:
@@ -57,19 +57,19 @@ def loops_table(rows: Sequence[LoopRow], title: str, columns: Sequence[str] = AR
     return table
 
 
-def faults_table(report: Report) -> Table:
+def faults_table(report: FaultReport) -> Table:
     """Return how many decisions came from which rung, by kind of fault."""
     verdict = "clean" if report.is_clean else "NOT CLEAN"
     table = Table(title=f"{report.subject}: {report.steps} steps, {verdict}")
-    for name in ("fault", "times", *(outcome.name.lower() for outcome in Outcome)):
+    for name in ("fault", "times", *(outcome.name.lower() for outcome in InputSource)):
         table.add_column(name, justify="right")
     for kind in ("none", *KINDS):
-        counts = [report.outcomes[kind, outcome] for outcome in Outcome]
+        counts = [report.outcomes[kind, outcome] for outcome in InputSource]
         table.add_row(kind, str(report.faults[kind] or ""), *(str(n or "") for n in counts))
     return table
 
 
-def said(report: Report) -> str:
+def said(report: FaultReport) -> str:
     """Return what was found, in a line."""
     return (
         f"{report.subject}: {report.bad_inputs} inputs not finite or out of bounds, "

@@ -5,10 +5,10 @@ it is told the problem as lists of elementary operations, and our referee judges
 """
 
 from benchmarks.peers.compare import compare
-from benchmarks.peers.entry import BadResults, Entry, Report
+from benchmarks.peers.entry import BadResults, Entry, PeerReport
 from benchmarks.peers.environment import Environment, InstallFailed, NotInstalled
 from benchmarks.peers.jobs import JOBS
-from benchmarks.peers.peer import PEERS, Peer
+from benchmarks.peers.peer import PEERS, PeerPackage
 from benchmarks.peers.tables import markdown, quicker, tables
 
 __all__ = [
@@ -19,8 +19,8 @@ __all__ = [
     "Environment",
     "InstallFailed",
     "NotInstalled",
-    "Peer",
-    "Report",
+    "PeerPackage",
+    "PeerReport",
     "compare",
     "markdown",
     "quicker",

@@ -7,23 +7,23 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.peers.contender import Contender, PeerContender
-from benchmarks.peers.entry import Entry, Report
+from benchmarks.peers.entry import Entry, PeerReport
 from benchmarks.peers.environment import Environment
 from benchmarks.peers.jobs import NamedJob
 from benchmarks.peers.ours import own_contenders
-from benchmarks.peers.peer import Peer
+from benchmarks.peers.peer import PeerPackage
 from benchmarks.peers.race import COLD_SOLVES, race
 from benchmarks.sweep.row import machine
 
 
 def compare(
-    peers: Sequence[Peer],
+    peers: Sequence[PeerPackage],
     jobs: Sequence[NamedJob],
     *,
     cold: int = COLD_SOLVES,
     cache: Path | None = None,
     said: Callable[[str], None] = lambda line: None,
-) -> Report:
+) -> PeerReport:
     """Run jobs by our solvers and by peers, job by job.
 
     Args:
@@ -48,7 +48,7 @@ def compare(
         found = race(job, [*own_contenders(job), *others], cold=cold)
         entries += _merged(found)
     load.append(_load())
-    return Report(machine=_machine(), load=load, titles=titles, entries=tuple(entries))
+    return PeerReport(machine=_machine(), load=load, titles=titles, entries=tuple(entries))
 
 
 def _merged(entries: Sequence[Entry]) -> list[Entry]:

@@ -13,7 +13,7 @@ from benchmarks.peers.conversation import Conversation, PeerFailed
 from benchmarks.peers.environment import Environment
 from benchmarks.peers.export import exported
 from benchmarks.peers.job import Job, Situation
-from benchmarks.peers.peer import Peer
+from benchmarks.peers.peer import PeerPackage
 from benchmarks.sweep.row import versions
 from ocp import Guess, Program, Solution, Solver, Status, UnsupportedProblem
 
@@ -21,12 +21,12 @@ from ocp import Guess, Program, Solution, Solver, Status, UnsupportedProblem
 BUILD_LIMIT, SOLVE_LIMIT = 300.0, 60.0
 
 
-class CannotTreat(Exception):
+class PeerCannotTreat(Exception):
     """A contender says that a job is none for it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class PeerAnswer:
     """One solve: its processor time [s], what came out, what its solver says."""
 
     seconds: float
@@ -53,7 +53,7 @@ class Contender(ABC):
         """
 
     @abstractmethod
-    def solve(self, situation: Situation, *, cold: bool) -> Answer:
+    def solve(self, situation: Situation, *, cold: bool) -> PeerAnswer:
         """Solve for a situation: from the job's guess, or from the last answer.
 
         Raises:
@@ -68,7 +68,11 @@ class PeerContender(Contender):
     """A peer with one of its settings, in its own process."""
 
     def __init__(
-        self, peer: Peer, setting: str, environment: Environment, solve_limit: float = SOLVE_LIMIT
+        self,
+        peer: PeerPackage,
+        setting: str,
+        environment: Environment,
+        solve_limit: float = SOLVE_LIMIT,
     ) -> None:
         """Start nothing yet."""
         self.name, self.versions = peer.title(setting), {}
@@ -83,12 +87,12 @@ class PeerContender(Contender):
         request = {"do": "build", "job": exported(job, self._setting)}
         answer = self._conversation.ask(request, BUILD_LIMIT)
         if "cannot" in answer:
-            raise CannotTreat(str(answer["cannot"]))
+            raise PeerCannotTreat(str(answer["cannot"]))
         with _expecting(answer):
             self.versions, self.remark = dict(answer["versions"]), str(answer["remark"])
             return float(answer["seconds"])
 
-    def solve(self, situation: Situation, *, cold: bool) -> Answer:
+    def solve(self, situation: Situation, *, cold: bool) -> PeerAnswer:
         """Send it a situation."""
         job = self._job
         assert self._conversation is not None, "it is built before it solves"
@@ -101,7 +105,7 @@ class PeerContender(Contender):
         answer = self._conversation.ask(request, self._limit)
         with _expecting(answer):
             plan = _plan(job, situation, self.name, answer)
-            return Answer(float(answer["seconds"]), plan, str(answer["status"]))
+            return PeerAnswer(float(answer["seconds"]), plan, str(answer["status"]))
 
     def close(self) -> None:
         """End its process."""
@@ -125,12 +129,12 @@ class OwnContender(Contender):
         try:
             self._program: Program = self._solver.build(job.ocp)
         except UnsupportedProblem as reason:
-            raise CannotTreat(str(reason)) from reason
+            raise PeerCannotTreat(str(reason)) from reason
         self._guess = Guess(x=job.guess["x"], u=job.guess["u"])
         self._last: Solution | None = None
         return perf_counter() - began
 
-    def solve(self, situation: Situation, *, cold: bool) -> Answer:
+    def solve(self, situation: Situation, *, cold: bool) -> PeerAnswer:
         """Run the program."""
         start = None if cold else self._last
         began = process_time()
@@ -142,7 +146,7 @@ class OwnContender(Contender):
         )
         seconds = process_time() - began
         self._last = plan
-        return Answer(seconds, plan, plan.status.name.lower())
+        return PeerAnswer(seconds, plan, plan.status.name.lower())
 
 
 @contextmanager

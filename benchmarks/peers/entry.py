@@ -56,7 +56,7 @@ class Entry:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class PeerReport:
     """A run of the comparison: where it ran, what it was asked, what came out.
 
     Attributes:
@@ -80,7 +80,7 @@ class Report:
         new.replace(file)
 
     @classmethod
-    def read(cls, file: Path) -> "Report":
+    def read(cls, file: Path) -> "PeerReport":
         """Read it.
 
         Raises:

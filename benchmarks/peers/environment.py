@@ -10,7 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.peers.peer import Peer
+from benchmarks.peers.peer import PeerPackage
 from ocp import Compiler
 
 _BIN = "Scripts" if sys.platform == "win32" else "bin"
@@ -34,7 +34,7 @@ class Environment:
         cache: folder of all environments; None: ``ocp-toolkit/peers`` in the user's cache.
     """
 
-    peer: Peer
+    peer: PeerPackage
     cache: Path | None = None
 
     @property

@@ -7,7 +7,8 @@ import numpy as np
 
 from benchmarks.peers.job import Job
 from benchmarks.peers.tape import tape_of
-from ocp import RK4, Stage, UnsupportedProblem, derive
+from ocp import RK4, UnsupportedProblem, minimum_principle
+from ocp.internal import Stage
 
 
 def exported(job: Job, setting: str) -> dict[str, Any]:
@@ -82,7 +83,7 @@ def _terminal(job: Job) -> ca.Function:
 
 def _extremal(job: Job) -> tuple[dict | None, str]:
     try:
-        conditions = derive(job.ocp)
+        conditions = minimum_principle(job.ocp)
     except UnsupportedProblem as reason:
         return None, str(reason)
     if not conditions.flow.is_a("SXFunction"):

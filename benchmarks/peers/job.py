@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import OCP, RK4, ProblemError, Stage
+from ocp import OCP, RK4, ProblemError
+from ocp.internal import Stage
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,8 @@ from benchmarks.cases.arm import arm_scenario
 from benchmarks.peers.job import Job, Situation
 from benchmarks.speed import linear as linear_speed
 from models import cart_pole_swing_up, cart_pole_upright, mass_spring_damper
-from ocp import OCP, RK4, Guess, Stage
+from ocp import OCP, RK4, Guess
+from ocp.internal import Stage
 from solvers import MultipleShooting
 
 SCENARIO = "arm-001"

@@ -7,7 +7,7 @@ _HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
-class Peer:
+class PeerPackage:
     """A package and the script that speaks for it.
 
     Args:
@@ -39,51 +39,53 @@ class Peer:
         return f"{self.name}, {setting}" if setting else self.name
 
 
-PEERS: tuple[Peer, ...] = (
-    Peer("scipy", "solve_bvp of scipy on the equations of the minimum principle", "scipy_bvp.py"),
-    Peer(
+PEERS: tuple[PeerPackage, ...] = (
+    PeerPackage(
+        "scipy", "solve_bvp of scipy on the equations of the minimum principle", "scipy_bvp.py"
+    ),
+    PeerPackage(
         "qpmpc",
         "linear MPC condensed to a quadratic program; its setting is the backend",
         "qpmpc_qp.py",
         "qpmpc.txt",
         ("osqp", "piqp", "proxqp", "daqp", "quadprog"),
     ),
-    Peer(
+    PeerPackage(
         "do-mpc",
         "direct, IPOPT; its collocation, or our RK4 step as a discrete model",
         "do_mpc_direct.py",
         "do-mpc.txt",
         ("same grid", "collocation"),
     ),
-    Peer(
+    PeerPackage(
         "acados",
         "SQP with HPIPM, generated C; full steps to convergence, or real-time iteration",
         "acados_sqp.py",
         "acados.txt",
         ("SQP", "SQP, Gauss-Newton", "RTI"),
     ),
-    Peer("rockit", "direct multiple shooting, IPOPT", "rockit_direct.py", "rockit.txt"),
-    Peer(
+    PeerPackage("rockit", "direct multiple shooting, IPOPT", "rockit_direct.py", "rockit.txt"),
+    PeerPackage(
         "crocoddyl",
         "differential dynamic programming with boxes around the controls",
         "crocoddyl_ddp.py",
         "crocoddyl.txt",
     ),
-    Peer(
+    PeerPackage(
         "control",
         "python-control: single shooting, SLSQP of scipy; its setting is where slopes come from",
         "control_optimal.py",
         "control.txt",
         ("our derivatives", "differences"),
     ),
-    Peer(
+    PeerPackage(
         "ssqp",
         "SQP along the stages, HPIPM or ADMM within",
         "ssqp_qp.py",
         "ssqp.txt",
         ("HPIPM", "HPIPM, projected", "ADMM, projected"),
     ),
-    Peer(
+    PeerPackage(
         "nmpyc",
         "direct, IPOPT, on our RK4 step as a discrete system",
         "nmpyc_direct.py",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.peers.contender import Answer, CannotTreat, Contender
+from benchmarks.peers.contender import Contender, PeerAnswer, PeerCannotTreat
 from benchmarks.peers.conversation import PeerFailed
 from benchmarks.peers.entry import Entry
 from benchmarks.peers.environment import NotInstalled
@@ -18,7 +18,7 @@ COLD_SOLVES = 5
 # answered counts.
 PATIENCE = 15.0
 _REASONS = {
-    CannotTreat: "cannot treat it",
+    PeerCannotTreat: "cannot treat it",
     NotInstalled: "not installed",
     PeerFailed: "failed",
 }
@@ -30,8 +30,8 @@ class _Runner:
 
     contender: Contender
     build: float = 0.0
-    cold: dict[int, Answer] = field(default_factory=dict)
-    warm: dict[int, Answer] = field(default_factory=dict)
+    cold: dict[int, PeerAnswer] = field(default_factory=dict)
+    warm: dict[int, PeerAnswer] = field(default_factory=dict)
     trouble: Exception | None = None
 
     @property
@@ -40,14 +40,14 @@ class _Runner:
         return self.trouble is None and spent < PATIENCE
 
     @property
-    def judged(self) -> dict[int, Answer]:
+    def judged(self) -> dict[int, PeerAnswer]:
         """The answers that count: those of the steps, where there are any."""
         return self.warm or self.cold
 
     def prepare(self, job: Job) -> None:
         try:
             self.build = self.contender.build(job)
-        except (CannotTreat, NotInstalled, PeerFailed) as trouble:
+        except (PeerCannotTreat, NotInstalled, PeerFailed) as trouble:
             self.trouble = trouble
 
     def solve(self, job: Job, turn: int, *, cold: bool) -> None:
@@ -155,11 +155,11 @@ def _costs(runner: _Runner) -> tuple[dict[int, float], list[float]]:
     return costs, [verdict.violation for verdict in verdicts.values()]
 
 
-def _median(answers: dict[int, Answer]) -> float | None:
+def _median(answers: dict[int, PeerAnswer]) -> float | None:
     return float(np.median([a.seconds for a in answers.values()])) if answers else None
 
 
-def _ratio(theirs: dict[int, Answer], ours: list[dict[int, Answer]]) -> float | None:
+def _ratio(theirs: dict[int, PeerAnswer], ours: list[dict[int, PeerAnswer]]) -> float | None:
     """Median over the turns of the time over that of the quickest of ours."""
     known = [answers for answers in ours if answers]
     if not theirs or not known:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from benchmarks.peers.entry import Entry, Report
+from benchmarks.peers.entry import Entry, PeerReport
 from benchmarks.sweep.row import FEASIBLE
 
 _COLUMNS = (
@@ -22,7 +22,7 @@ _COLUMNS = (
 _WORDS = ("who", "version", "remarks")
 
 
-def tables(report: Report) -> Iterator[Table]:
+def tables(report: PeerReport) -> Iterator[Table]:
     """Return a table for each job."""
     for job, title in report.titles.items():
         table = Table(title=title)
@@ -34,7 +34,7 @@ def tables(report: Report) -> Iterator[Table]:
         yield table
 
 
-def markdown(report: Report) -> str:
+def markdown(report: PeerReport) -> str:
     """Return the same tables for a page of the docs."""
     blocks = []
     for job, title in report.titles.items():
@@ -46,7 +46,7 @@ def markdown(report: Report) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def quicker(report: Report) -> list[str]:
+def quicker(report: PeerReport) -> list[str]:
     """Return a sentence for every peer that was quicker than ours with answers as good.
 
     As good: feasible for the referee in every solve, and no more than 0.1 % above our cost.
@@ -73,7 +73,7 @@ def _is_good(entry: Entry) -> bool:
     )
 
 
-def _of(report: Report, job: str) -> list[Entry]:
+def _of(report: PeerReport, job: str) -> list[Entry]:
     return [entry for entry in report.entries if entry.job == job]
 
 

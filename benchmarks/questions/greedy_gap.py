@@ -6,14 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-from models import (
-    lq_regulator,
-    mass_spring_damper,
-    stable_plant,
-    thesis_regulator,
-    unstable_plant,
-    van_der_pol,
-)
+from models import lq_regulator, mass_spring_damper, stable_plant, thesis_regulator, unstable_plant
+from models.textbook import van_der_pol
 from ocp import OCP, Box, evaluate, solve
 from solvers import Greedy, MultipleShooting
 

@@ -6,7 +6,7 @@ from benchmarks.sweep.row import FEASIBLE, SAME_OPTIMUM, Row
 
 
 @dataclass(frozen=True)
-class Level:
+class ReportLevel:
     """Thresholds with a name.
 
     Attributes:
@@ -34,8 +34,8 @@ class Level:
 
 
 LEVELS = (
-    Level("low", FEASIBLE, SAME_OPTIMUM, 1e-2),
-    Level("medium", 1e-6, 1e-4, 1e-4),
-    Level("high", 1e-6, 1e-6, 1e-5),
+    ReportLevel("low", FEASIBLE, SAME_OPTIMUM, 1e-2),
+    ReportLevel("medium", 1e-6, 1e-4, 1e-4),
+    ReportLevel("high", 1e-6, 1e-6, 1e-5),
 )
 LOW = LEVELS[0]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from benchmarks.report.level import LEVELS, Level
+from benchmarks.report.level import LEVELS, ReportLevel
 from benchmarks.report.plot import Plot, power_of_ten
 from benchmarks.report.rows import Part, parts_of, time_of
 from benchmarks.report.section import Block, Section, Text, missing
@@ -32,7 +32,7 @@ def reaching(rows: Sequence[Row]) -> Section:
     return Section("time", "Time to a given gap", blocks)
 
 
-def _plot(part: Part, level: Level) -> Plot:
+def _plot(part: Part, level: ReportLevel) -> Plot:
     known = {row.case for row in part.rows if row.reference is not None}
     judged = {m: [row for row in part.of(m) if row.case in known] for m in part.methods}
     reached = {

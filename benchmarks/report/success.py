@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from benchmarks.report.level import LEVELS, LOW, Level
+from benchmarks.report.level import LEVELS, LOW, ReportLevel
 from benchmarks.report.rows import Part, parts_of
 from benchmarks.report.section import Block, Section, Text
 from benchmarks.report.sheet import Cell, Sheet
@@ -57,7 +57,7 @@ def _line(method: str, rows: Sequence[Row]) -> list[Cell]:
     ]
 
 
-def share(level: Level, rows: Sequence[Row]) -> float | None:
+def share(level: ReportLevel, rows: Sequence[Row]) -> float | None:
     """Return the percentage of the rows that can be judged which meet a level."""
     met = [level.met_by(row) for row in rows]
     judged = [one for one in met if one is not None]

@@ -11,7 +11,7 @@ from time import process_time
 import numpy as np
 
 from models import random_scenarios
-from ocp import MPC, OCP, Applied, Outcome, Solver, solve
+from ocp import MPC, OCP, InputSource, PlantInput, Solver, solve
 from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
 INTERVALS = (10, 20, 35, 50, 100, 200)
@@ -93,7 +93,7 @@ class Field:
     def line_up(self) -> "Racing":
         """Build the controllers."""
         guess = solve(self.ocp, MultipleShooting(N, compiled=True)).or_raise()
-        applied = Applied("rate")
+        applied = PlantInput("rate")
         racing = {
             (name, compiled): MPC(
                 ocp=self.ocp, solver=solver, dt=DT, applied=applied, guess=guess, compiled=compiled
@@ -122,7 +122,7 @@ class Racing:
             started = process_time()
             decision = mpc.step(measured, k * DT)
             self._times[key].append(process_time() - started)
-            is_new = decision.outcome in (Outcome.OPTIMAL, Outcome.FEASIBLE)
+            is_new = decision.outcome in (InputSource.OPTIMAL, InputSource.FEASIBLE)
             self._planned[key] += k >= _WARM and is_new
             rates.append(decision.input)
         self._x = self._x + DT * rates[0]

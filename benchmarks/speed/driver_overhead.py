@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from rich.table import Table
 
 from benchmarks.speed.arm import DT, NOISE, N, arm
-from ocp import MPC, OCP, Applied, FlightRecorder, Program, Solution, Solver, Start, solve
+from ocp import MPC, OCP, FlightRecorder, InitialGuess, PlantInput, Program, Solution, Solver, solve
 from solvers import MultipleShooting
 
 # In this process, so that it uses the same caches.
@@ -89,7 +89,7 @@ class _TimedProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         started = perf_counter()
         found = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
@@ -123,7 +123,7 @@ class _StandInProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         self.work(x0, t0)
         return self.answer.with_(t=self.answer.t - self.answer.t[0] + t0)
@@ -155,7 +155,7 @@ def driver_overhead(count: int = 200) -> list[Overhead]:
     ocp, rng = arm(), np.random.default_rng(0)
     timed = {name: _Timed(solver) for name, solver in _contenders(ocp).items()}
     racing = {
-        name: MPC(ocp=ocp, solver=solver, dt=DT, applied=Applied("rate"))
+        name: MPC(ocp=ocp, solver=solver, dt=DT, applied=PlantInput("rate"))
         for name, solver in timed.items()
     }
     whole, recording = ({name: [] for name in racing} for _ in range(2))

@@ -64,7 +64,7 @@ def mass_tracking(steps: int) -> OCP:
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class LinearCase:
     """What a controller sees at one step: time [s], state (2,), reference ahead (N + 1, 2)."""
 
     t: float
@@ -72,13 +72,13 @@ class Situation:
     ahead: np.ndarray
 
 
-def situations(steps: int, count: int) -> list[Situation]:
+def situations(steps: int, count: int) -> list[LinearCase]:
     """Return the steps of a closed loop while the bound of the position is in its horizon."""
     plant, program = mass_spring_damper().sampled(DT), LinearMPC().build(mass_tracking(steps))
     reference = sinusoid(DT * np.arange(count + 40 + steps + 1))
     seen, x = [], np.zeros(2)
     for k in range(count + 40):
-        now = Situation(k * DT, x, reference[k : k + steps + 1])
+        now = LinearCase(k * DT, x, reference[k : k + steps + 1])
         plan = program.run(x0=x, t0=now.t, parameters={"reference": now.ahead}).or_raise()
         if plan.history["multipliers"].any():
             seen.append(now)
@@ -86,7 +86,7 @@ def situations(steps: int, count: int) -> list[Situation]:
     return seen[:count]
 
 
-def median_time(step: Callable[[Situation], object], seen: Sequence[Situation]) -> float:
+def median_time(step: Callable[[LinearCase], object], seen: Sequence[LinearCase]) -> float:
     """Return the median time of a step [s]; the first one, which may prepare, does not count."""
     step(seen[0])
     taken = []
@@ -122,8 +122,8 @@ def unconstrained(steps: int) -> OCP:
     return lq_regulator(unstable_plant(), Q=100.0, R=500.0, P=10.0, x0=np.ones(3), horizon=steps)
 
 
-def _steps(mass: OCP, free: OCP) -> dict[str, Callable[[Situation], object]]:
-    def on_mass(program: Program) -> Callable[[Situation], object]:
+def _steps(mass: OCP, free: OCP) -> dict[str, Callable[[LinearCase], object]]:
+    def on_mass(program: Program) -> Callable[[LinearCase], object]:
         return lambda s: program.run(x0=s.x, t0=s.t, parameters={"reference": s.ahead})
 
     batch, riccati = Batch().build(free), Riccati().build(free)

@@ -10,7 +10,8 @@ import casadi as ca
 from rich.table import Table
 
 from benchmarks.speed.arm import N, arm
-from ocp import OCP, RK4, Compiler, Solver, Stage, assembled, c_code, curvature
+from ocp import OCP, RK4, Compiler, Solver
+from ocp.internal import Stage, c_code, differentiable_step, stage_hessian
 from solvers import MultipleShooting
 
 _CACHE = "XDG_CACHE_HOME"
@@ -49,8 +50,8 @@ class StageCode:
         return cls(
             links=links,
             written_out=len(c_code(_written_out(ocp), _ALONG)),
-            assembled=len(c_code(assembled(ocp, RK4()), _ALONG)),
-            curvature=len(c_code(curvature(ocp, RK4()))),
+            assembled=len(c_code(differentiable_step(ocp, RK4()), _ALONG)),
+            curvature=len(c_code(stage_hessian(ocp, RK4()))),
             build=_build(fatrop, ocp),
         )
 

@@ -14,7 +14,7 @@ from benchmarks.cases import all_cases
 from benchmarks.methods.every import all_methods
 from benchmarks.methods.method import Method, Settings
 from benchmarks.sweep.row import Row
-from benchmarks.sweep.task import Task
+from benchmarks.sweep.task import SweepTask
 
 READY = "ready\n"
 
@@ -34,7 +34,7 @@ def work(methods: Sequence[Method]) -> None:
     by_name = {method.name: method for method in methods}
     _answer(answers, READY)
     for entry in order["tasks"]:
-        task = Task(**{**entry, "settings": Settings(**entry["settings"])})
+        task = SweepTask(**{**entry, "settings": Settings(**entry["settings"])})
         signal.setitimer(signal.ITIMER_REAL, order["limit"])
         case, method = cases[task.suite, task.case], by_name[task.method]
         outcome = method.run(case, task.settings)

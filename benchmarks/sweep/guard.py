@@ -14,7 +14,7 @@ from typing import IO
 from benchmarks.sweep.child import READY
 from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
-from benchmarks.sweep.task import Task
+from benchmarks.sweep.task import SweepTask
 
 _LONGEST = 300  # characters of a message
 
@@ -29,7 +29,7 @@ class Group:
         module: what the process runs; tests have one with methods that crash.
     """
 
-    tasks: tuple[Task, ...]
+    tasks: tuple[SweepTask, ...]
     limit: float
     module: str = "benchmarks.sweep.child"
 
@@ -54,7 +54,7 @@ def run_group(group: Group, tell: Callable[[Row], object] = lambda row: None) ->
     return rows
 
 
-def _one_process(group: Group, tasks: Sequence[Task]) -> Iterator[Row]:
+def _one_process(group: Group, tasks: Sequence[SweepTask]) -> Iterator[Row]:
     """Yield the rows that one process computes, at last the row that it did not survive."""
     with tempfile.TemporaryFile() as errors:
         process = _start(group.module, errors)

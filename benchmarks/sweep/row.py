@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.cases import Case
 from benchmarks.methods.method import Method, Outcome, Settings
-from benchmarks.sweep.task import Key, Task, key_of
+from benchmarks.sweep.task import Key, SweepTask, key_of
 
 RESULTS = "results.jsonl"
 # A row counts as solved if its method says so and the referee finds no larger violation.
@@ -113,7 +113,7 @@ class Row:
         )
 
     @classmethod
-    def lost(cls, task: Task, status: str, message: str, elapsed: float) -> "Row":
+    def lost(cls, task: SweepTask, status: str, message: str, elapsed: float) -> "Row":
         """Make the row of a task whose process ended without an answer."""
         return cls(
             suite=task.suite,

@@ -10,7 +10,7 @@ from benchmarks.sweep.row import OtherVersion, Row, versions
 
 
 @dataclass(frozen=True)
-class Found:
+class ReadRows:
     """What a file holds.
 
     Attributes:
@@ -31,10 +31,10 @@ class Found:
         return notes
 
 
-def read_found(file: Path) -> Found:
+def read_found(file: Path) -> ReadRows:
     """Read a file; no file: nothing is found."""
     if not file.exists():
-        return Found()
+        return ReadRows()
     rows, foreign, corrupt = {}, [], []
     lines = file.read_bytes().split(b"\n")
     for number, line in enumerate(lines, start=1):
@@ -48,7 +48,7 @@ def read_found(file: Path) -> Found:
             corrupt.append((number, str(wrong)))
         else:
             rows[row.key] = row
-    return Found(tuple(rows.values()), tuple(foreign), tuple(corrupt))
+    return ReadRows(tuple(rows.values()), tuple(foreign), tuple(corrupt))
 
 
 def read_rows(file: Path) -> tuple[Row, ...]:

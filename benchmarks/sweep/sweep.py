@@ -11,11 +11,11 @@ from benchmarks.sweep.guard import Group
 from benchmarks.sweep.lock import locked
 from benchmarks.sweep.row import RESULTS, Row, versions
 from benchmarks.sweep.rows_file import prepare, read_rows
-from benchmarks.sweep.task import Key, Task, groups_of
+from benchmarks.sweep.task import Key, SweepTask, groups_of
 
 
 def sweep(
-    tasks: Sequence[Task],
+    tasks: Sequence[SweepTask],
     out: Path,
     *,
     resume: bool,
@@ -61,7 +61,7 @@ def _done(file: Path, retry: bool) -> set[Key]:
 
 
 def _compute(
-    todo: Sequence[Task],
+    todo: Sequence[SweepTask],
     execution: Execution,
     file: Path,
     advance: Callable[[], object],

@@ -11,7 +11,7 @@ Key = tuple[str, str, str, str]
 
 
 @dataclass(frozen=True)
-class Task:
+class SweepTask:
     """One row to compute, in words: what any process on any machine can be sent.
 
     Attributes:
@@ -41,10 +41,10 @@ def key_of(suite: str, case: str, method: str, options: str, settings: Settings)
 
 def tasks_of(
     cases: Iterable[Case], methods: Sequence[Method], *settings: Settings
-) -> tuple[Task, ...]:
+) -> tuple[SweepTask, ...]:
     """Return a task for every setting and method that a case declares, case by case."""
     return tuple(
-        Task(case.suite, case.name, method.name, method.settings, setting)
+        SweepTask(case.suite, case.name, method.name, method.settings, setting)
         for case in cases
         for setting in settings
         for method in methods
@@ -52,7 +52,7 @@ def tasks_of(
     )
 
 
-def groups_of(tasks: Iterable[Task]) -> list[tuple[Task, ...]]:
+def groups_of(tasks: Iterable[SweepTask]) -> list[tuple[SweepTask, ...]]:
     """Return the tasks of one case and setting together: several begin where another ended."""
     neighbours = groupby(tasks, key=lambda task: (task.suite, task.case, task.settings))
     return [tuple(group) for _, group in neighbours]

@@ -1,1 +1,83 @@
-"""Problems of the literature, one a file: small models whose optima are known well."""
+"""Textbook problems, each with its source."""
+
+from models.textbook.brachistochrone import brachistochrone
+from models.textbook.collision_costs import BarrierCost, bounded_ocp, unbounded_ocp
+from models.textbook.double_integrator import (
+    discrete_double_integrator,
+    double_integrator_bounded_energy,
+    double_integrator_distance,
+    double_integrator_energy,
+    double_integrator_fuel,
+    double_integrator_minimum_time,
+)
+from models.textbook.electric_vehicle import electric_vehicle
+from models.textbook.exponential import (
+    exponential_energy,
+    exponential_fuel,
+    exponential_minimum_time,
+)
+from models.textbook.fuller import fuller
+from models.textbook.goddard import goddard
+from models.textbook.hanging_chain import hanging_chain
+from models.textbook.integrator import (
+    integrator_free_time,
+    integrator_free_time_quadratic,
+    mixed_constraint,
+    moving_floor,
+    turnpike,
+)
+from models.textbook.isoperimetric import isoperimetric
+from models.textbook.linear_hypersensitive import linear_hypersensitive
+from models.textbook.oscillator_regulator import oscillator_regulator
+from models.textbook.oscillators import hypersensitive, rayleigh, rayleigh_constrained, van_der_pol
+from models.textbook.pendulum import pendulum_minimum_time, pendulum_swing_up
+from models.textbook.polar_arm import polar_arm
+from models.textbook.reactors import catalyst_mixing, two_catalysts
+from models.textbook.state_constrained_mass import beam, breakwell, bryson_denham
+from models.textbook.tangent_steering import linear_tangent_steering
+from models.textbook.two_link_arm import two_link_arm_energy, two_link_arm_minimum_time
+from models.textbook.zermelo import zermelo
+
+__all__ = [
+    "BarrierCost",
+    "beam",
+    "bounded_ocp",
+    "brachistochrone",
+    "breakwell",
+    "bryson_denham",
+    "catalyst_mixing",
+    "discrete_double_integrator",
+    "double_integrator_bounded_energy",
+    "double_integrator_distance",
+    "double_integrator_energy",
+    "double_integrator_fuel",
+    "double_integrator_minimum_time",
+    "electric_vehicle",
+    "exponential_energy",
+    "exponential_fuel",
+    "exponential_minimum_time",
+    "fuller",
+    "goddard",
+    "hanging_chain",
+    "hypersensitive",
+    "integrator_free_time",
+    "integrator_free_time_quadratic",
+    "isoperimetric",
+    "linear_hypersensitive",
+    "linear_tangent_steering",
+    "mixed_constraint",
+    "moving_floor",
+    "oscillator_regulator",
+    "pendulum_minimum_time",
+    "pendulum_swing_up",
+    "polar_arm",
+    "rayleigh",
+    "rayleigh_constrained",
+    "turnpike",
+    "two_catalysts",
+    "two_link_arm_energy",
+    "two_link_arm_minimum_time",
+    "unbounded_ocp",
+    "van_der_pol",
+    "zermelo",
+]

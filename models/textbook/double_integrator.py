@@ -4,7 +4,8 @@ import casadi as ca
 
 from models.textbook.ends import ends_at
 from models.textbook.mass import mass
-from ocp import OCP, Box, FreeTime, Model, positive, whole
+from ocp import OCP, Box, FreeTime, Model
+from ocp.internal import check_positive, check_whole
 
 
 def double_integrator_energy() -> OCP:
@@ -148,8 +149,8 @@ def discrete_double_integrator(steps: int, dt: float) -> OCP:
     Raises:
         ProblemError: if one of them is not.
     """
-    whole(steps, "discrete double integrator: steps")
-    model = mass(positive(dt, "discrete double integrator: dt"))
+    check_whole(steps, "discrete double integrator: steps")
+    model = mass(check_positive(dt, "discrete double integrator: dt"))
     return OCP(
         name="discrete double integrator",
         model=model,

@@ -4,7 +4,8 @@ import casadi as ca
 import numpy as np
 
 from models.textbook.ends import ends_at
-from ocp import OCP, Box, FreeTime, Guess, Model, positive
+from ocp import OCP, Box, FreeTime, Guess, Model
+from ocp.internal import check_positive
 
 DRAG, DECAY, THRUST, EXHAUST = 310.0, 500.0, 3.5, 0.5
 
@@ -25,7 +26,7 @@ def goddard(*, fastest: float = np.inf) -> OCP:
     Args:
         fastest: limit of the speed; inf: none.
     """
-    limit = positive(fastest, "Goddard: fastest", finite=False)
+    limit = check_positive(fastest, "Goddard: fastest", finite=False)
     r, v, m, thrust = (ca.SX.sym(name) for name in ("radius", "speed", "mass", "thrust"))
     drag = DRAG * v**2 * ca.exp(-DECAY * (r - 1.0))
     rate = ca.vertcat(v, (thrust - drag) / m - 1.0 / r**2, -thrust / EXHAUST)

@@ -6,12 +6,12 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
-from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance, positive
+from ocp.checks.arguments import check_instance, check_positive
+from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.linear.structure import Terms, read_terms
-from ocp.model import Model
-from ocp.parameters import Parameter, Signal
-from ocp.problem import OCP
+from ocp.problem.model import Model
+from ocp.problem.ocp import OCP
+from ocp.problem.parameters import Parameter, Signal
 
 # A horizon that is a multiple of dt up to this is one.
 _MULTIPLE = 1e-9
@@ -39,12 +39,12 @@ def discretise(ocp: OCP, dt: float) -> OCP:
         UnsupportedProblem: naming the term that is not linear or quadratic, or changes with time.
         ProblemError: if dt does not fit the horizon or a signal.
     """
-    instance(ocp, OCP, "discretise: the problem")
+    check_instance(ocp, OCP, "discretise: the problem")
     if ocp.model.is_discrete:
         raise ProblemError(f"{ocp.name}: the model is discrete already")
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: a free final time has no number of steps")
-    positive(dt, f"{ocp.name}: dt [s]")
+    check_positive(dt, f"{ocp.name}: dt [s]")
     steps = _whole(ocp.duration / dt, f"{ocp.name}: the horizon of {ocp.duration:g} s", dt)
     terms = read_terms(ocp)
     _refuse_time(ocp, terms)

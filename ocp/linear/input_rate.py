@@ -6,11 +6,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.constraint import Box, Constraint
-from ocp.errors import ProblemError, UnsupportedProblem
-from ocp.expressions import instance, numbers
-from ocp.model import Model
-from ocp.problem import OCP
+from ocp.checks.arguments import check_instance, check_numbers
+from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.problem.constraint import Box, Constraint
+from ocp.problem.model import Model
+from ocp.problem.ocp import OCP
 
 
 def with_input_rate(
@@ -35,12 +35,12 @@ def with_input_rate(
         UnsupportedProblem: for a continuous model, where the derivative of the control is meant.
         ProblemError: for a negative weight or a wrong size.
     """
-    instance(ocp, OCP, "with_input_rate: the problem")
-    instance(rate, Box, "with_input_rate: rate")
+    check_instance(ocp, OCP, "with_input_rate: the problem")
+    check_instance(rate, Box, "with_input_rate: rate")
     m = ocp.model
     if not m.is_discrete:
         raise UnsupportedProblem(f"{ocp.name}: a change per step needs a discrete-time model")
-    weights = numbers(weight, m.nu, f"{ocp.name}: weight of the rate")
+    weights = check_numbers(weight, m.nu, f"{ocp.name}: weight of the rate")
     if (weights < 0.0).any():
         raise ProblemError(f"{ocp.name}: a negative weight of the rate: {weights}")
     before = ca.vertcat(*[ca.SX.sym(f"previous {name}") for name in m.u_names])
@@ -60,7 +60,7 @@ def with_input_rate(
         ocp,
         name=f"{ocp.name}, with input rate",
         model=_model(m, before, change),
-        x0=np.append(np.asarray(ocp.x0), numbers(previous, m.nu, f"{ocp.name}: previous")),
+        x0=np.append(np.asarray(ocp.x0), check_numbers(previous, m.nu, f"{ocp.name}: previous")),
         running_cost=moved(ocp.running_cost) + ca.dot(ca.DM(weights), change**2),
         control_bounds=rate,
         state_bounds=Box(np.append(state.lower, -free), np.append(state.upper, free)),

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ocp.constraint import Box
-from ocp.data import Data
-from ocp.errors import ProblemError
+from ocp.checks.errors import ProblemError
 from ocp.linear.node_function import NodeFunction
-from ocp.problem import OCP
+from ocp.problem.constraint import Box
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
 
 # An eigenvalue this much below zero, relative to the largest one, is rounding.
 _ROUNDING = 1e-10
@@ -156,7 +156,7 @@ class LinearQuadratic:
         """Number of steps N."""
         return self.ocp.steps or 0
 
-    def on(self, data: Data) -> LQData:
+    def on(self, data: RunData) -> LQData:
         """Return the numbers of a run.
 
         Raises:
@@ -186,9 +186,9 @@ class LinearQuadratic:
         return None if varying else self.sample_matrices(self.declared)
 
     @property
-    def declared(self) -> Data:
+    def declared(self) -> RunData:
         """The data of a run that leaves everything as declared."""
-        return Data.of(self.ocp)
+        return RunData.of(self.ocp)
 
     @cached_property
     def nodes(self) -> np.ndarray:
@@ -199,11 +199,11 @@ class LinearQuadratic:
     def _vectors(self) -> tuple[NodeFunction, NodeFunction]:
         return NodeFunction(self.stage_vectors, self.steps), NodeFunction(self.end_vectors, 1)
 
-    def _at(self, data: Data) -> tuple[np.ndarray, np.ndarray]:
+    def _at(self, data: RunData) -> tuple[np.ndarray, np.ndarray]:
         """Return times (N + 1,) and parameters (N + 1, n_p) at the nodes."""
         return data.t0 + self.nodes, data.values.samples(self.steps + 1)
 
-    def sample_matrices(self, data: Data) -> Matrices:
+    def sample_matrices(self, data: RunData) -> Matrices:
         """Return the matrices of a run, whether convex or not."""
         t, p = self._at(data)
         blocks = [
@@ -214,7 +214,7 @@ class LinearQuadratic:
         a, b, q, s, r, d_x, d_u = blocks
         return Matrices(a, b, q, s, r, end[0], d_x, d_u, end[1])
 
-    def _sample_vectors(self, data: Data, matrices: Matrices) -> LQData:
+    def _sample_vectors(self, data: RunData, matrices: Matrices) -> LQData:
         t, p = self._at(data)
         _, n, m = matrices.B.shape
         stage, end = self._vectors[0](t[:-1], p[:-1]), self._vectors[1](t[-1:], p[-1:])[0]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
-from ocp.describe import readable
+from ocp.checks.expressions import readable
 
 
 def degrees(expression: ca.SX, variables: ca.SX) -> np.ndarray:

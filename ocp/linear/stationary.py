@@ -6,11 +6,11 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are
 
-from ocp.errors import UnsupportedProblem
-from ocp.expressions import instance
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import UnsupportedProblem
 from ocp.linear.linear_quadratic import Matrices
 from ocp.linear.structure import linear_quadratic, read_terms
-from ocp.problem import OCP
+from ocp.problem.ocp import OCP
 
 # Singular values below this, relative to the largest one, are zero.
 _RANK = 1e-10
@@ -42,7 +42,7 @@ def stationary(matrices: Matrices, name: str = "the problem") -> Stationary:
         UnsupportedProblem: if the matrices change with time, naming the mode that the control
             does not reach, or that the cost does not see.
     """
-    instance(matrices, Matrices, "stationary: the matrices")
+    check_instance(matrices, Matrices, "stationary: the matrices")
     for label in ("A", "B", "Q", "S", "R"):
         if np.ptp(getattr(matrices, label), axis=0).any():
             raise UnsupportedProblem(
@@ -81,7 +81,7 @@ def with_stationary_end(ocp: OCP) -> OCP:
     Raises:
         UnsupportedProblem: what ``linear_quadratic`` and ``stationary`` refuse.
     """
-    instance(ocp, OCP, "with_stationary_end: the problem")
+    check_instance(ocp, OCP, "with_stationary_end: the problem")
     lq = linear_quadratic(replace(ocp, terminal_cost=0.0))
     if lq.fixed is None:
         raise UnsupportedProblem(

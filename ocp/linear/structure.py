@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ocp.constraint import Box, Constraint
-from ocp.errors import UnsupportedProblem
-from ocp.expressions import instance
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import UnsupportedProblem
 from ocp.linear.linear_quadratic import LinearQuadratic
 from ocp.linear.polynomial import beyond
-from ocp.problem import OCP
+from ocp.problem.constraint import Box, Constraint
+from ocp.problem.ocp import OCP
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
             is indefinite with its eigenvalue; for a continuous model, which ``discretise``
             makes discrete; for a start on a manifold.
     """
-    instance(ocp, OCP, "linear_quadratic: the problem")
+    check_instance(ocp, OCP, "linear_quadratic: the problem")
     if not ocp.model.is_discrete:
         raise UnsupportedProblem(
             f"{ocp.name}: the model is continuous in time; make it discrete: discretise(ocp, dt)"

@@ -6,12 +6,12 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import linprog
 
-from ocp.constraint import Constraint
-from ocp.errors import UnsupportedProblem
+from ocp.checks.errors import UnsupportedProblem
 from ocp.linear.linear_quadratic import Matrices
 from ocp.linear.stationary import stationary, with_stationary_end
 from ocp.linear.structure import linear_quadratic, read_terms
-from ocp.problem import OCP
+from ocp.problem.constraint import Constraint
+from ocp.problem.ocp import OCP
 
 # A constraint that is exceeded by no more than this, relative to its size, is implied.
 _REDUNDANT = 1e-9

@@ -1,1 +1,1 @@
-"""The receding-horizon driver: plan, check, apply, measure; never an input nobody answers for."""
+"""Model predictive control: solve, check, apply, and what to apply when that fails."""

@@ -1,1 +1,1 @@
-"""The referee: integrate the controls until the cost holds, then judge."""
+"""The referee: integrate the controls until the cost no longer changes, then judge."""

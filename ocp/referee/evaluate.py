@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ocp.expressions import instance, positive
+from ocp.checks.arguments import check_instance, check_positive
+from ocp.referee.reference_trajectory import ReferenceTrajectory, adjoint, integrate_controls
 from ocp.referee.stationarity import final_costate, stationarity
-from ocp.referee.truth import Truth, adjoint, follow
 from ocp.referee.violation import drift, violations
-from ocp.solution import Solution
+from ocp.solution.solution import Solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Evaluation:
     stationarity: float | None
     task_drift: float
     defect: float
-    truth: Truth
+    truth: ReferenceTrajectory
 
 
 def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
@@ -53,9 +53,9 @@ def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
     Raises:
         ProblemError: if it is no solution, or the tolerance not positive.
     """
-    instance(solution, Solution, "evaluate: solution")
-    positive(tolerance, "evaluate: tolerance")
-    truth = follow(solution, tolerance=tolerance)
+    check_instance(solution, Solution, "evaluate: solution")
+    check_positive(tolerance, "evaluate: tolerance")
+    truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
         return Evaluation(
             cost=np.inf,
@@ -91,8 +91,8 @@ def costates_along(solution: Solution) -> Solution:
     Args:
         solution: of any method; returned as it is where its controls make the state blow up.
     """
-    instance(solution, Solution, "costates_along: solution")
-    truth = follow(solution)
+    check_instance(solution, Solution, "costates_along: solution")
+    truth = integrate_controls(solution)
     if not truth.is_finite:
         return solution
     costates, _ = adjoint(solution, truth, final_costate(solution, truth)[0])

@@ -3,18 +3,18 @@
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ocp.constraint import Constraint
-from ocp.hamiltonian import hamiltonian
-from ocp.referee.truth import Truth, adjoint
-from ocp.referee.violation import path_values, stacked_box
-from ocp.solution import Solution
+from ocp.minimum_principle.hamiltonian import hamiltonian
+from ocp.problem.constraint import Constraint, stacked_box
+from ocp.referee.reference_trajectory import ReferenceTrajectory, adjoint
+from ocp.referee.violation import path_values
+from ocp.solution.solution import Solution
 
 # A constraint closer than this to its bound is taken as active, and the costate of the cost
 # alone then says nothing about optimality.
 _ACTIVE = 1e-5
 
 
-def stationarity(solution: Solution, truth: Truth) -> float | None:
+def stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None:
     """Return the residual of the minimum principle with the referee's own costates.
 
     The largest of abs(u - clip(u - H_u)) over time (for held, linear and polynomial controls
@@ -42,7 +42,7 @@ def stationarity(solution: Solution, truth: Truth) -> float | None:
     return float(max(residual, *ends))
 
 
-def _path_is_active(solution: Solution, truth: Truth) -> bool:
+def _path_is_active(solution: Solution, truth: ReferenceTrajectory) -> bool:
     ocp = solution.problem
     path = stacked_box(ocp.at("path"))
     boxes = [(ocp.state_bounds, truth.x[1:])]
@@ -57,7 +57,7 @@ def _path_is_active(solution: Solution, truth: Truth) -> bool:
 
 
 def _pointwise(
-    solution: Solution, truth: Truth, costates: np.ndarray
+    solution: Solution, truth: ReferenceTrajectory, costates: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Controls and H_u at the start of each step."""
     gradient = hamiltonian(solution.problem).control_gradient.map(len(truth.u_start))
@@ -68,7 +68,7 @@ def _pointwise(
 
 
 def _averaged(
-    solution: Solution, truth: Truth, g0: np.ndarray, g1: np.ndarray
+    solution: Solution, truth: ReferenceTrajectory, g0: np.ndarray, g1: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Controls and dJ/du of each node or interval, per second of its support."""
     nodes, u = solution.t, solution.u
@@ -94,7 +94,7 @@ def _averaged(
 
 
 def _by_coefficient(
-    solution: Solution, truth: Truth, gradients: tuple[np.ndarray, ...]
+    solution: Solution, truth: ReferenceTrajectory, gradients: tuple[np.ndarray, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients and dJ/dc of each, per second of its support (the integral of its basis)."""
     pieces, t = solution.pieces, truth.t
@@ -106,7 +106,7 @@ def _by_coefficient(
     return solution.u, (gradient / weight[:, None, None]).reshape(solution.u.shape)
 
 
-def final_costate(solution: Solution, truth: Truth) -> tuple[np.ndarray, float]:
+def final_costate(solution: Solution, truth: ReferenceTrajectory) -> tuple[np.ndarray, float]:
     """Return phi_x + psi_x' nu, and phi_t + nu' psi_t, with the best multipliers.
 
     Those of active terminal constraints are fitted to the solution's own costate.
@@ -140,7 +140,7 @@ def _multipliers(
     return nu
 
 
-def _start_residual(solution: Solution, truth: Truth, costate: np.ndarray) -> float:
+def _start_residual(solution: Solution, truth: ReferenceTrajectory, costate: np.ndarray) -> float:
     """Distance of the initial costate from the normals of the start manifold."""
     ocp = solution.problem
     if not ocp.has_free_start:
@@ -153,7 +153,9 @@ def _start_residual(solution: Solution, truth: Truth, costate: np.ndarray) -> fl
     return float(np.abs(costate + normals.T @ mu).max(initial=0.0))
 
 
-def _time_residual(solution: Solution, truth: Truth, costates: np.ndarray, at_end: float) -> float:
+def _time_residual(
+    solution: Solution, truth: ReferenceTrajectory, costates: np.ndarray, at_end: float
+) -> float:
     """Natural residual of the duration T, from dJ/dT for controls that stretch with it.
 
     With time and signals written as fractions of the horizon,

@@ -4,14 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ocp.constraint import Box, Constraint
-from ocp.referee.truth import Truth
-from ocp.solution import Solution
+from ocp.problem.constraint import Box, Constraint
+from ocp.referee.reference_trajectory import ReferenceTrajectory
+from ocp.solution.solution import Solution
 
 Violation = tuple[str, float]
 
 
-def violations(solution: Solution, truth: Truth) -> Iterator[Violation]:
+def violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:
     """Yield 'what at which time' and by how much, for every bound and constraint."""
     ocp, m = solution.problem, solution.problem.model
     yield from _outside("state", m.x_names, ocp.state_bounds, truth.x, truth.t)
@@ -27,7 +27,7 @@ def violations(solution: Solution, truth: Truth) -> Iterator[Violation]:
     yield "final time", float(ocp.time_box.excess(np.array([solution.duration]))[0])
 
 
-def drift(solution: Solution, truth: Truth) -> float:
+def drift(solution: Solution, truth: ReferenceTrajectory) -> float:
     """Return the largest violation of the problem's invariants."""
     ocp = solution.problem
     if not ocp.invariants:
@@ -38,7 +38,9 @@ def drift(solution: Solution, truth: Truth) -> float:
     return max(excess for _, excess in _worst_instants(ocp.invariants, values, truth.t))
 
 
-def path_values(solution: Solution, truth: Truth) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def path_values(
+    solution: Solution, truth: ReferenceTrajectory
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield path constraints (K, m) and times (K,), at the starts of the steps and at the ends.
 
     In discrete time a control belongs to the start of its step alone: at the ends its
@@ -56,13 +58,6 @@ def path_values(solution: Solution, truth: Truth) -> Iterator[tuple[np.ndarray, 
         at_end[:, on_control] = at_start[:, on_control]
     yield at_start, truth.t[:-1]
     yield at_end, truth.t[1:]
-
-
-def stacked_box(constraints: tuple[Constraint, ...]) -> Box:
-    """Return the bounds of several constraints as one box."""
-    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
-    upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
-    return Box(lower, upper)
 
 
 def _outside(

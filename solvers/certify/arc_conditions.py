@@ -8,8 +8,9 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from ocp import Signal, Solution, hamiltonian
-from solvers.certify.arcs import Arc, NoArcsError
+from ocp import Signal, Solution
+from ocp.internal import hamiltonian
+from solvers.certify.control_arcs import Arc, NoArcsError
 
 
 @dataclass(frozen=True, eq=False)

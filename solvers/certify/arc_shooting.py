@@ -8,7 +8,7 @@ import numpy as np
 
 from ocp import Solution, Status
 from solvers.certify.arc_conditions import ArcConditions
-from solvers.indirect.newton import NewtonResult, newton
+from solvers.indirect.newton_iteration import NewtonResult, newton
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ import numpy as np
 from ocp import ProblemError, Solution, evaluate
 from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
-from solvers.certify.arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.certificate import Estimate
+from solvers.certify.control_arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.estimates import BARRIER, TOLERANCE, NoEstimateError, extrapolated
-from solvers.certify.stretched import Stretched
+from solvers.certify.time_scaled_problem import TimeScaledProblem
 from solvers.direct.multiple_shooting import MultipleShooting
 
 # Of the equations of indirect shooting; and of the cost from step to half the step, relative.
@@ -90,7 +90,7 @@ def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
 
 def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Durations and held controls by multiple shooting, on grids doubled on every arc."""
-    stretched, verdicts = Stretched(answer, arcs), []
+    stretched, verdicts = TimeScaledProblem(answer, arcs), []
     ocp, found = stretched.ocp, None
     for intervals in _INTERVALS:
         program = MultipleShooting(intervals * len(arcs), tolerance=BARRIER).build(ocp)

@@ -6,7 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import Solution, Status, UnsupportedProblem, instance, positive, whole
+from ocp import Solution, Status, UnsupportedProblem
+from ocp.internal import check_instance, check_positive, check_whole
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.certificate import (
     AGREEMENT,
@@ -18,7 +19,6 @@ from solvers.certify.certificate import (
     Verdict,
     agreement,
 )
-from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.discrete_estimates import by_linear_method, by_nonlinear_program
 from solvers.certify.estimates import (
     NoEstimateError,
@@ -36,6 +36,7 @@ from solvers.certify.global_evidence import (
 )
 from solvers.certify.grid_conditions import CHECKS as GRID
 from solvers.certify.grid_conditions import grid_checks
+from solvers.certify.hamiltonian_check import hamiltonian_check
 
 # So many independent methods are compared.
 _METHODS = 2
@@ -50,7 +51,7 @@ _SMOOTH_DRIFT, _OTHER_DRIFT = 1e-6, 1e-3
 
 
 @dataclass(frozen=True)
-class Effort:
+class CertifyOptions:
     """How much is done for a certificate.
 
     Attributes:
@@ -71,10 +72,10 @@ class Effort:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        whole(self.intervals, "certify: intervals")
-        whole(self.starts, "certify: starts")
-        whole(self.seed, "certify: seed", least=0)
-        positive(self.seconds, "certify: seconds", finite=False)
+        check_whole(self.intervals, "certify: intervals")
+        check_whole(self.starts, "certify: starts")
+        check_whole(self.seed, "certify: seed", least=0)
+        check_positive(self.seconds, "certify: seconds", finite=False)
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class _Clock:
         return Check.skipped(name, f"left out: the {self.seconds:g} s it was given were over")
 
 
-def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
+def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certificate:
     """Certify the optimal value of the problem that a solution solves.
 
     Methods that differ in what they discretise and solve are taken to the end, as far as they
@@ -113,7 +114,7 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
 
     Args:
         solution: near the optimum that is to be certified; of any method.
-        effort: default ``Effort()``.
+        effort: default ``CertifyOptions()``.
 
     Returns:
         the certificate; it says itself whether it holds, and what was not checked.
@@ -122,9 +123,9 @@ def certify(solution: Solution, effort: Effort | None = None) -> Certificate:
         UnsupportedProblem: if direct multiple shooting solves the problem on no grid, or no
             method answers.
     """
-    effort = effort or Effort()
-    instance(solution, Solution, "certify: solution")
-    instance(effort, Effort, "certify: effort")
+    effort = effort or CertifyOptions()
+    check_instance(solution, Solution, "certify: solution")
+    check_instance(effort, CertifyOptions, "certify: effort")
     clock = _Clock(effort.seconds, perf_counter())
     try:
         coarse = on_grid(solution, effort.intervals)
@@ -193,7 +194,7 @@ def _piecewise(found: list[Estimate]) -> Solution:
     raise NoEstimateError("collocation shows none")
 
 
-def _global(best: Estimate, effort: Effort, intervals: int, clock: _Clock) -> list[Check]:
+def _global(best: Estimate, effort: CertifyOptions, intervals: int, clock: _Clock) -> list[Check]:
     """What can be said of the optimum being the global one."""
     reason = other_data(best.solution)
     if reason:

@@ -7,9 +7,9 @@ import numpy as np
 
 from ocp import OCP, Box, Solution, Status, UnsupportedProblem, evaluate
 from solvers.certify.certificate import Estimate
-from solvers.certify.localised import PARTS, localised
+from solvers.certify.local_error import PARTS, local_error
 from solvers.collocation.collocation import Collocation
-from solvers.collocation.refined import refined
+from solvers.collocation.refine_mesh import refine_mesh
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.polish import polish
 
@@ -92,7 +92,7 @@ def by_collocation(coarse: Solution) -> Estimate:
     """
     solver = Collocation(intervals=_INTERVALS, tolerance=BARRIER)
     try:
-        found = refined(coarse, solver=solver, accuracy=_DEFECT)
+        found = refine_mesh(coarse, solver=solver, accuracy=_DEFECT)
     except UnsupportedProblem as reason:
         raise NoEstimateError(str(reason)) from None
     answer = found.solution
@@ -101,7 +101,7 @@ def by_collocation(coarse: Solution) -> Estimate:
         raise NoEstimateError(f"collocation: {answer.status.value}. {answer.message}")
     verdict, change = evaluate(answer, tolerance=TOLERANCE), np.inf
     barrier, bias = BARRIER if _has_inequalities(coarse.problem) else 0.0, 0.0
-    for finer in localised(answer, found.rounds[-1].mesh.cut(PARTS), _ROUNDS, solver):
+    for finer in local_error(answer, found.rounds[-1].mesh.cut(PARTS), _ROUNDS, solver):
         before, answer = verdict.cost, finer
         verdict = evaluate(answer, tolerance=TOLERANCE)
         change, bias = abs(verdict.cost - before), barrier * len(answer.t)

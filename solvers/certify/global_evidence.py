@@ -7,7 +7,6 @@ import numpy as np
 
 from ocp import (
     OCP,
-    Data,
     ProblemError,
     Signal,
     Solution,
@@ -17,9 +16,10 @@ from ocp import (
     linear_quadratic,
     solve,
 )
+from ocp.internal import RunData
 from solvers.certify.certificate import CONVEXITY, STARTS, Check, Estimate, Verdict
 from solvers.direct.multiple_shooting import MultipleShooting
-from solvers.indirect.enumerate_extremals import enumerate_extremals
+from solvers.indirect.reverse.enumerate_extremals import enumerate_extremals
 from solvers.multistart import multistart
 
 EXTREMALS = "enumerated extremals"
@@ -39,7 +39,7 @@ _ROOTS = 12
 
 def other_data(solution: Solution) -> str:
     """Say which number of a run is not the problem's own, which is all that is searched here."""
-    ocp, own, run = solution.problem, Data.of(solution.problem), solution.data
+    ocp, own, run = solution.problem, RunData.of(solution.problem), solution.data
     if not ocp.has_free_start and not np.array_equal(own.x0, run.x0):
         return f"the start {run.x0} is not that of the problem, {own.x0}"
     if own.t0 != run.t0:

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
-from ocp import RK4, Solution, Transcription
+from ocp import RK4, Solution
+from ocp.internal import Transcription
 from solvers.certify.certificate import Check, Verdict
 
 # A bound this close, relative to 1 + abs(bound), is taken as active.

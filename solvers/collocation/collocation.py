@@ -8,25 +8,15 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    Data,
-    Program,
-    Solution,
-    Solver,
-    Start,
-    UnsupportedProblem,
-    elevated,
-    instance,
-    positive,
-)
+from ocp import OCP, InitialGuess, Program, Solution, Solver, UnsupportedProblem
+from ocp.internal import RunData, check_instance, check_positive, elevated
+from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
+from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
-from solvers.collocation.gaps import Gaps
-from solvers.collocation.mesh import Grid, Mesh
-from solvers.collocation.points import Family, Points
-from solvers.collocation.transcription import Collocated, Unknowns
-from solvers.direct.backend import Answer, Backend
-from solvers.direct.search import Found, Search
+from solvers.collocation.defects import Defects
+from solvers.collocation.mesh import CollocationGrid, Mesh
+from solvers.direct.nlp_backends import NlpBackend, NlpResult
+from solvers.direct.nlp_run import NlpOutcome, NlpRun
 
 
 @dataclass(frozen=True)
@@ -75,11 +65,11 @@ class Collocation(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        Points.of(self.points, self.degree)
+        CollocationPoints.of(self.points, self.degree)
         if self.mesh is not None:
-            instance(self.mesh, Mesh, "collocation: mesh")
+            check_instance(self.mesh, Mesh, "collocation: mesh")
         self.chosen_mesh  # noqa: B018 - checks its own
-        positive(self.accuracy, "collocation: accuracy", finite=False)
+        check_positive(self.accuracy, "collocation: accuracy", finite=False)
         self.options  # noqa: B018 - checks its own
 
     @property
@@ -88,9 +78,9 @@ class Collocation(Solver):
         return self.mesh or Mesh.uniform(self.intervals, self.degree)
 
     @property
-    def options(self) -> Backend:
+    def options(self) -> NlpBackend:
         """The backend with its options."""
-        return Backend(
+        return NlpBackend(
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
             verbose=self.verbose,
@@ -103,13 +93,13 @@ class Collocation(Solver):
         Raises:
             UnsupportedProblem: for a discrete-time model, which has nothing to collocate.
         """
-        instance(ocp, OCP, "collocation: the problem")
+        check_instance(ocp, OCP, "collocation: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
             )
-        grid = Grid.of(self.chosen_mesh, self.points)
-        program = CollocationProgram(self, Collocated(ocp, grid), Gaps.of(ocp, grid))
+        grid = CollocationGrid.of(self.chosen_mesh, self.points)
+        program = CollocationProgram(self, CollocatedProblem(ocp, grid), Defects.of(ocp, grid))
         program.search.nlp  # noqa: B018 - all symbolic work is done here
         return program
 
@@ -125,8 +115,8 @@ class CollocationProgram(Program):
     """
 
     solver: Collocation
-    transcription: Collocated
-    gaps: Gaps
+    transcription: CollocatedProblem
+    gaps: Defects
 
     def run(
         self,
@@ -134,24 +124,24 @@ class CollocationProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started, ocp = perf_counter(), self.transcription.ocp
-        data = Data.of(ocp, x0, t0, parameters)
+        data = RunData.of(ocp, x0, t0, parameters)
         first = self._first_iterate(data, ocp.first_guess(guess))
         found = self.search.solve(first.joined(), data)
         return self._solution(data, found, perf_counter() - started)
 
     @cached_property
-    def search(self) -> Search:
+    def search(self) -> NlpRun:
         """The backend, and what is done around it."""
         solver = self.solver
-        return Search(self.transcription, solver.options, solver.accuracy, self._error)
+        return NlpRun(self.transcription, solver.options, solver.accuracy, self._error)
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def _first_iterate(self, data: Data, guess: Start | None) -> Unknowns:
+    def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> CollocationUnknowns:
         """States and controls of the guess; without states, the controls' own roll-out."""
         grid, ocp = self.transcription.grid, self.transcription.ocp
         m = ocp.model
@@ -166,7 +156,7 @@ class CollocationProgram(Program):
             x = np.tile(data.x0, (len(grid.nodes), 1))
         z = x[grid.edge_nodes].T
         z = np.vstack([z, np.full((1, z.shape[1]), duration)]) if ocp.has_free_time else z
-        return Unknowns(z, c.T, x[grid.point_nodes].T)
+        return CollocationUnknowns(z, c.T, x[grid.point_nodes].T)
 
     def _coefficients(self, u: np.ndarray) -> np.ndarray:
         """Bernstein coefficients of controls at the points, (M, nu) both."""
@@ -184,7 +174,7 @@ class CollocationProgram(Program):
 
     # -- the answer --------------------------------------------------------------------------
 
-    def _error(self, answer: Answer, data: Data) -> tuple[float, int]:
+    def _error(self, answer: NlpResult, data: RunData) -> tuple[float, int]:
         w, tr = answer.w, self.transcription
         u = self._elevated(tr.split(w).c.T)
         moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
@@ -200,7 +190,7 @@ class CollocationProgram(Program):
         x[grid.point_nodes] = parts.x.T  # within the state bounds, at the edges as well
         return x
 
-    def _solution(self, data: Data, found: Found, seconds: float) -> Solution:
+    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
         tr, answer = self.transcription, found.last
         return Solution(
             problem=tr.ocp,

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ocp import Data
-from solvers.collocation.transcription import Collocated
-from solvers.direct.backend import Answer
+from ocp.internal import RunData
+from solvers.collocation.collocated_problem import CollocatedProblem
+from solvers.direct.nlp_backends import NlpResult
 
 
-def costates(tr: Collocated, answer: Answer, data: Data) -> np.ndarray:
+def costates(tr: CollocatedProblem, answer: NlpResult, data: RunData) -> np.ndarray:
     r"""Return dJ*/dx at all nodes, (N + 1, nx), from the multipliers of the dynamics.
 
     With multipliers mu_i of the points and nu of the end of an interval, the derivative of the
@@ -47,7 +47,7 @@ def costates(tr: Collocated, answer: Answer, data: Data) -> np.ndarray:
     return result
 
 
-def _at_the_end(tr: Collocated, answer: Answer, data: Data) -> np.ndarray:
+def _at_the_end(tr: CollocatedProblem, answer: NlpResult, data: RunData) -> np.ndarray:
     """What state bounds and path constraints without control add to the costate there, (nx,).
 
     Gauss' points impose nothing at the end.

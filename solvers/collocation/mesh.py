@@ -5,8 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import ProblemError, instance, real, whole
-from solvers.collocation.points import Family, Points
+from ocp import ProblemError
+from ocp.internal import check_instance, check_real, check_whole
+from solvers.collocation.collocation_points import CollocationPoints, Family
 
 
 @dataclass(frozen=True)
@@ -26,23 +27,23 @@ class Mesh:
 
     def __post_init__(self) -> None:
         """Check both, and keep them as tuples."""
-        instance(self.edges, (tuple, list, np.ndarray), "mesh: edges")
-        instance(self.degrees, (tuple, list, np.ndarray), "mesh: degrees")
-        edges = tuple(real(edge, "mesh: edge") for edge in self.edges)
+        check_instance(self.edges, (tuple, list, np.ndarray), "mesh: edges")
+        check_instance(self.degrees, (tuple, list, np.ndarray), "mesh: degrees")
+        edges = tuple(check_real(edge, "mesh: edge") for edge in self.edges)
         degrees = tuple(self.degrees)
         if len(edges) < 2 or edges[0] != 0.0 or edges[-1] != 1.0 or not min(np.diff(edges)) > 0.0:
             raise ProblemError("mesh: the edges must increase from 0 to 1")
         if len(degrees) != len(edges) - 1:
             raise ProblemError(f"mesh: {len(degrees)} degrees for {len(edges) - 1} intervals")
         for degree in degrees:
-            Points.of("radau", degree)
+            CollocationPoints.of("radau", degree)
         object.__setattr__(self, "edges", edges)
         object.__setattr__(self, "degrees", degrees)
 
     @classmethod
     def uniform(cls, intervals: int, degree: int) -> "Mesh":
         """Return equal intervals of one degree."""
-        whole(intervals, "mesh: intervals")
+        check_whole(intervals, "mesh: intervals")
         return cls(tuple(np.linspace(0.0, 1.0, intervals + 1)), (degree,) * intervals)
 
     @property
@@ -67,7 +68,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class CollocationGrid:
     """A mesh with its collocation points: M of them, on all intervals.
 
     Attributes:
@@ -76,12 +77,12 @@ class Grid:
     """
 
     mesh: Mesh
-    points: tuple[Points, ...]
+    points: tuple[CollocationPoints, ...]
 
     @classmethod
-    def of(cls, mesh: Mesh, family: Family) -> "Grid":
+    def of(cls, mesh: Mesh, family: Family) -> "CollocationGrid":
         """Put the points of a family on a mesh."""
-        return cls(mesh, tuple(Points.of(family, degree) for degree in mesh.degrees))
+        return cls(mesh, tuple(CollocationPoints.of(family, degree) for degree in mesh.degrees))
 
     @cached_property
     def owner(self) -> np.ndarray:

@@ -6,29 +6,18 @@ from time import perf_counter
 
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    Data,
-    ProblemError,
-    Program,
-    Solution,
-    Solver,
-    Start,
-    UnsupportedProblem,
-    instance,
-    positive,
-    whole,
-)
-from solvers.constrained.ascent import Ascent
-from solvers.constrained.relaxed import Relaxed
+from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
+from ocp.internal import RunData, check_instance, check_positive, check_whole
+from solvers.constrained.multiplier_iteration import MultiplierIteration
+from solvers.constrained.relaxed_problem import RelaxedProblem
 
 
 @dataclass(frozen=True)
 class AugmentedLagrangian(Solver):
     r"""Turn constraints into costs, and the costs into constraints again, round by round.
 
-    The relaxed problem (see ``Relaxed``) is built once by the inner solver. After each of its
-    runs the *referee* integrates the controls, and the multipliers at the nodes follow
+    The relaxed problem (see ``RelaxedProblem``) is built once by the inner solver. After each of
+    its runs the *referee* integrates the controls, and the multipliers at the nodes follow
 
     .. math::
 
@@ -76,11 +65,11 @@ class AugmentedLagrangian(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        instance(self.inner, Solver, "augmented Lagrangian: inner")
-        whole(self.intervals, "augmented Lagrangian: intervals")
-        whole(self.max_iterations, "augmented Lagrangian: max_iterations")
+        check_instance(self.inner, Solver, "augmented Lagrangian: inner")
+        check_whole(self.intervals, "augmented Lagrangian: intervals")
+        check_whole(self.max_iterations, "augmented Lagrangian: max_iterations")
         for name in ("penalty", "largest_penalty", "growth"):
-            positive(getattr(self, name), f"augmented Lagrangian: {name}")
+            check_positive(getattr(self, name), f"augmented Lagrangian: {name}")
         if self.penalty > self.largest_penalty:
             raise ProblemError(
                 f"augmented Lagrangian: penalty <= largest_penalty is needed, not "
@@ -89,7 +78,7 @@ class AugmentedLagrangian(Solver):
         if not self.growth > 1.0:
             raise ProblemError(f"augmented Lagrangian: growth = {self.growth}, it must exceed 1")
         for name in ("tolerance", "complementarity"):
-            positive(getattr(self, name), f"augmented Lagrangian: {name}", finite=False)
+            check_positive(getattr(self, name), f"augmented Lagrangian: {name}", finite=False)
 
     def build(self, ocp: OCP) -> "AugmentedLagrangianProgram":
         """Relax the problem and let the inner solver build that.
@@ -98,13 +87,13 @@ class AugmentedLagrangian(Solver):
             UnsupportedProblem: if there is nothing to relax, in discrete time, or from the inner
                 solver.
         """
-        instance(ocp, OCP, "augmented Lagrangian: the problem")
+        check_instance(ocp, OCP, "augmented Lagrangian: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "
                 "use a direct method"
             )
-        relaxed = Relaxed.of(ocp, self.intervals)
+        relaxed = RelaxedProblem.of(ocp, self.intervals)
         if not relaxed.path.size + relaxed.end.size:
             raise UnsupportedProblem(
                 f"{ocp.name}: there is no path, state or terminal constraint to relax; use "
@@ -126,7 +115,7 @@ class AugmentedLagrangianProgram(Program):
 
     solver: AugmentedLagrangian
     ocp: OCP
-    relaxed: Relaxed
+    relaxed: RelaxedProblem
     inner: Program
 
     def run(
@@ -135,11 +124,11 @@ class AugmentedLagrangianProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Alternate between the inner solver and the multipliers."""
         started = perf_counter()
-        data = Data.of(self.ocp, x0, t0, parameters)
-        ascent = Ascent(self, data)
+        data = RunData.of(self.ocp, x0, t0, parameters)
+        ascent = MultiplierIteration(self, data)
         status, message = ascent.climb(guess)
         return ascent.solution(status, message, perf_counter() - started)

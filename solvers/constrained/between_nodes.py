@@ -13,19 +13,17 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    InitialGuess,
     Program,
     Signal,
     Solution,
     Solver,
-    Start,
     Status,
     UnsupportedProblem,
     evaluate,
-    instance,
-    positive,
-    whole,
 )
-from solvers.constrained.rows import Rows
+from ocp.internal import check_instance, check_positive, check_whole
+from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
 _MARGIN = "margin between the nodes"
@@ -59,9 +57,9 @@ class BetweenNodes(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        instance(self.inner, MultipleShooting, "between nodes: inner")
-        whole(self.max_rounds, "between nodes: max_rounds")
-        positive(self.tolerance, "between nodes: tolerance", finite=False)
+        check_instance(self.inner, MultipleShooting, "between nodes: inner")
+        check_whole(self.max_rounds, "between nodes: max_rounds")
+        check_positive(self.tolerance, "between nodes: tolerance", finite=False)
 
     def build(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.
@@ -69,13 +67,13 @@ class BetweenNodes(Solver):
         Raises:
             UnsupportedProblem: in discrete time, where nothing lies between the nodes.
         """
-        instance(ocp, OCP, "between nodes: the problem")
+        check_instance(ocp, OCP, "between nodes: the problem")
         if ocp.model.is_discrete:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time, nothing lies between its nodes; "
                 f"use {self.inner!r} itself"
             )
-        rows = Rows.along(ocp)
+        rows = StandardForm.along(ocp)
         tightened = _tightened(ocp, rows, self.inner.intervals)
         return BetweenNodesProgram(self, ocp, rows, self.inner.build(tightened))
 
@@ -93,7 +91,7 @@ class BetweenNodesProgram(Program):
 
     solver: BetweenNodes
     ocp: OCP
-    rows: Rows
+    rows: StandardForm
     inner: Program
 
     def run(
@@ -102,7 +100,7 @@ class BetweenNodesProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Run, let the referee look, widen the margins, and again."""
         started, tolerance = perf_counter(), self.solver.tolerance
@@ -157,7 +155,7 @@ class BetweenNodesProgram(Program):
         )
 
 
-def _tightened(ocp: OCP, rows: Rows, intervals: int) -> OCP:
+def _tightened(ocp: OCP, rows: StandardForm, intervals: int) -> OCP:
     """Return the problem with margins; the constraints keep their names."""
     if not rows.size:
         return ocp

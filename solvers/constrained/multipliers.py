@@ -5,7 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.constrained.relaxed import END_MULTIPLIER, MULTIPLIER, PENALTY, SCALE, Relaxed
+from solvers.constrained.relaxed_problem import (
+    END_MULTIPLIER,
+    MULTIPLIER,
+    PENALTY,
+    SCALE,
+    RelaxedProblem,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,14 +26,14 @@ class Multipliers:
         scale: sigma, of the whole relaxed cost.
     """
 
-    relaxed: Relaxed
+    relaxed: RelaxedProblem
     path: np.ndarray
     end: np.ndarray
     penalty: float
     scale: float = 1.0
 
     @classmethod
-    def zero(cls, relaxed: Relaxed, intervals: int, penalty: float) -> "Multipliers":
+    def zero(cls, relaxed: RelaxedProblem, intervals: int, penalty: float) -> "Multipliers":
         """Return those one starts with."""
         shape = (intervals + 1, relaxed.path.size)
         return cls(relaxed, np.zeros(shape), np.zeros(relaxed.end.size), penalty)

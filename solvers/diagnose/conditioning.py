@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.diagnose.subject import Subject
+from solvers.diagnose.subject import DiagnosedProblem
 
 # A bound this close, relative to 1 + abs(bound), is taken as active.
 _ACTIVE = 1e-5
@@ -52,7 +52,7 @@ class Conditioning:
         )
 
 
-def conditioning(subject: Subject) -> Conditioning | None:
+def conditioning(subject: DiagnosedProblem) -> Conditioning | None:
     """Return the conditioning at the trial's answer; None where it failed or is too large."""
     tr, trial = subject.program.transcription, subject.trial
     if not trial.status.is_success or tr.size + len(tr.rows) > _LARGEST:
@@ -78,7 +78,7 @@ def _active(value: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarr
     return at_lower | at_upper
 
 
-def _matrix(subject: Subject, w: np.ndarray, free: np.ndarray) -> np.ndarray:
+def _matrix(subject: DiagnosedProblem, w: np.ndarray, free: np.ndarray) -> np.ndarray:
     """K, from the functions that the backend has built anyway."""
     tr = subject.program.transcription
     p, bounds = tr.data_vector(subject.data), tr.bounds(subject.data)
@@ -103,7 +103,7 @@ def _balance(matrix: np.ndarray) -> np.ndarray:
     return scales
 
 
-def _extremes(subject: Subject, scales: np.ndarray, free: np.ndarray) -> tuple[str, str]:
+def _extremes(subject: DiagnosedProblem, scales: np.ndarray, free: np.ndarray) -> tuple[str, str]:
     """Return the names of the unknowns with the largest and the smallest scale."""
     tr, m = subject.program.transcription, subject.ocp.model
     time = ["final time"] if subject.ocp.has_free_time else []

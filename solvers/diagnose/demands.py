@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from ocp import Constraint
-from solvers.diagnose.elastic import Demand, Elastic
+from solvers.diagnose.elastic_program import Demand, ElasticProgram
 from solvers.diagnose.graph import appearing
-from solvers.diagnose.subject import Subject
+from solvers.diagnose.subject import DiagnosedProblem
 
 Asked = tuple[Demand, ca.SX, float, float]
 
@@ -20,7 +20,7 @@ def size(*numbers: float) -> float:
     return max(finite, default=1.0)
 
 
-def of_box(subject: Subject, kind: Literal["state", "control"]) -> Iterator[Asked]:
+def of_box(subject: DiagnosedProblem, kind: Literal["state", "control"]) -> Iterator[Asked]:
     """Yield every finite bound; those of one control are one demand, those of a state two.
 
     A control that is too weak is so in both directions; of a state one side stands in the way.
@@ -42,7 +42,7 @@ def of_box(subject: Subject, kind: Literal["state", "control"]) -> Iterator[Aske
             yield Demand((name,), label, unit, large, is_control), symbols[i], low, high
 
 
-def of_constraint(subject: Subject, c: Constraint) -> Iterator[Asked]:
+def of_constraint(subject: DiagnosedProblem, c: Constraint) -> Iterator[Asked]:
     """Yield every row of a constraint."""
     for i, (row, low, high) in enumerate(
         zip(ca.vertsplit(c.expression), np.asarray(c.lower), np.asarray(c.upper), strict=True)
@@ -60,14 +60,16 @@ def of_constraint(subject: Subject, c: Constraint) -> Iterator[Asked]:
         )
 
 
-def at_instant(subject: Subject, asked: list[Asked], t: float, fraction: float) -> Elastic:
+def at_instant(
+    subject: DiagnosedProblem, asked: list[Asked], t: float, fraction: float
+) -> ElasticProgram:
     """Return the demands on (x, u) at one instant; x0 is not fixed."""
     ocp, m = subject.ocp, subject.ocp.model
     stacked = ca.vertcat(*[row for _, row, _, _ in asked])
     function = ca.Function("rows", [ca.vertcat(m.x, m.u), m.t, ocp.p], [ca.densify(stacked)])
     demands = tuple(dict.fromkeys(demand for demand, *_ in asked))
     w, free = ca.MX.sym("w", m.nx + m.nu), np.full(m.nx + m.nu, np.inf)
-    return Elastic(
+    return ElasticProgram(
         w=w,
         p=ca.MX(0, 1),
         hard=ca.MX(0, 1),

@@ -6,7 +6,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Data, Solution
+from ocp import OCP, Solution
+from ocp.internal import RunData
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
 # Random points around the guess, for what must hold wherever one looks.
@@ -16,7 +17,7 @@ _COARSE = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class SamplePoints:
     """Where functions are evaluated: K rows of each argument.
 
     Attributes:
@@ -38,14 +39,14 @@ class Points:
         found = function.map(len(self.t))(self.x.T, self.u.T, self.t[None, :], self.p.T)
         return np.array(found).reshape(value.numel(), len(self.t), order="F").T
 
-    def __add__(self, other: "Points") -> "Points":
+    def __add__(self, other: "SamplePoints") -> "SamplePoints":
         """Return both."""
         pairs = [(getattr(self, n), getattr(other, n)) for n in ("x", "u", "t", "p")]
-        return Points(*[np.concatenate(pair) for pair in pairs])
+        return SamplePoints(*[np.concatenate(pair) for pair in pairs])
 
 
 @dataclass(frozen=True, eq=False)
-class Subject:
+class DiagnosedProblem:
     """A problem under examination.
 
     Attributes:
@@ -56,7 +57,7 @@ class Subject:
     """
 
     ocp: OCP
-    data: Data
+    data: RunData
     solver: MultipleShooting
     given: Solution | None = None
 
@@ -66,7 +67,7 @@ class Subject:
         return self.solver.build(self.ocp)
 
     @cached_property
-    def coarse(self) -> "Subject":
+    def coarse(self) -> "DiagnosedProblem":
         """The same on fewer intervals with more steps in each, where many solves are needed."""
         if self.ocp.steps or self.solver.intervals <= _COARSE:
             return self
@@ -93,7 +94,7 @@ class Subject:
         return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)
 
     @cached_property
-    def along(self) -> Points:
+    def along(self) -> SamplePoints:
         """The nodes of the first iterate; the last control is held at the end."""
         z, u = self.guess
         fractions = self.program.transcription.fractions
@@ -101,19 +102,19 @@ class Subject:
         return self._points(z[:, : self.ocp.model.nx], u, fractions, duration)
 
     @cached_property
-    def tried(self) -> Points:
+    def tried(self) -> SamplePoints:
         """The nodes of the trial."""
         s = self.trial
         return self._points(s.x, s.u, s.fractions, s.duration)
 
     def _points(
         self, x: np.ndarray, u: np.ndarray, fractions: np.ndarray, duration: float
-    ) -> Points:
+    ) -> SamplePoints:
         t = self.data.t0 + fractions * duration
-        return Points(x, np.vstack([u, u[-1:]]), t, self.data.values.at(fractions))
+        return SamplePoints(x, np.vstack([u, u[-1:]]), t, self.data.values.at(fractions))
 
     @cached_property
-    def around(self) -> Points:
+    def around(self) -> SamplePoints:
         """Random points within the bounds, or around the first iterate where there are none."""
         rng, near = np.random.default_rng(0), self.along
         rows = rng.integers(len(near.t), size=_RANDOM)
@@ -128,7 +129,7 @@ class Subject:
 
         x = ocp.state_bounds.clip(scattered(near.x))
         u = ocp.control_bounds.clip(scattered(near.u))
-        return Points(x, u, near.t[rows], near.p[rows])
+        return SamplePoints(x, u, near.t[rows], near.p[rows])
 
     def unit(self, name: str) -> str:
         """Return the unit of a state or control; empty where none was declared."""

@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from solvers.diagnose.demands import of_box, of_constraint
-from solvers.diagnose.elastic import Demand, Elastic
-from solvers.diagnose.subject import Subject
+from solvers.diagnose.elastic_program import Demand, ElasticProgram
+from solvers.diagnose.subject import DiagnosedProblem
 
 # Rows that hold whatever else gives way.
 _HARD = ("dynamics", "time")
@@ -25,7 +25,7 @@ class _Row:
     upper: float
 
 
-def along(subject: Subject) -> tuple[Elastic, np.ndarray]:
+def along(subject: DiagnosedProblem) -> tuple[ElasticProgram, np.ndarray]:
     """Return the demands along the whole trajectory, and the node of every row."""
     tr = subject.program.transcription
     program, bounds = tr.program, tr.bounds(subject.data)
@@ -36,7 +36,7 @@ def along(subject: Subject) -> tuple[Elastic, np.ndarray]:
     box[0][relaxed], box[1][relaxed] = -np.inf, np.inf
     demands = tuple(dict.fromkeys(row.demand for row in rows))
     hard = [i for i, row in enumerate(tr.rows) if row.place in _HARD]
-    elastic = Elastic(
+    elastic = ElasticProgram(
         w=program["x"],
         p=program["p"],
         hard=program["g"][hard],
@@ -50,7 +50,7 @@ def along(subject: Subject) -> tuple[Elastic, np.ndarray]:
     return elastic, np.array([row.node for row in rows])
 
 
-def _boxed(subject: Subject) -> Iterator[_Row]:
+def _boxed(subject: DiagnosedProblem) -> Iterator[_Row]:
     """Yield the bounds of states and controls at every node; a given start is not relaxed."""
     ocp, tr = subject.ocp, subject.program.transcription
     m, width, count = ocp.model, tr.nz + ocp.model.nu, len(tr.rows)
@@ -63,7 +63,7 @@ def _boxed(subject: Subject) -> Iterator[_Row]:
             yield _Row(demand, count + j, j // width, lower, upper)
 
 
-def _constrained(subject: Subject) -> Iterator[_Row]:
+def _constrained(subject: DiagnosedProblem) -> Iterator[_Row]:
     """Yield the rows of the constraints, in the order of the program."""
     ocp, tr = subject.ocp, subject.program.transcription
     given = {

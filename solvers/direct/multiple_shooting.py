@@ -9,23 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    RK4,
-    Data,
-    Integrator,
-    Program,
-    Solution,
-    Solver,
-    Start,
-    Transcription,
-    instance,
-    positive,
-    whole,
-)
-from solvers.direct.backend import Answer, Backend
-from solvers.direct.intervals import Intervals
-from solvers.direct.search import Found, Search
+from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver
+from ocp.internal import RunData, Transcription, check_instance, check_positive, check_whole
+from solvers.direct.nlp_backends import NlpBackend, NlpResult
+from solvers.direct.nlp_run import NlpOutcome, NlpRun
+from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
@@ -50,9 +38,10 @@ class MultipleShooting(Solver):
             ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; where
             there is a limit it runs in a process of its own, and once ended it has nothing to
             show: ``FAILED``.
-        rescue: where the search fails, look for the least violating trajectory: it tells an
-            infeasible problem from a lost search and is a better start for a second one. It may
-            cost 300 iterations; a controller that has to answer in time does without.
+        feasibility_restoration: where the search fails, look for the least violating
+            trajectory: it tells an infeasible problem from a lost search and is a better start for
+            a second one. It may cost 300 iterations; a controller that has to answer in time
+            does without.
     """
 
     intervals: int = 75
@@ -64,19 +53,19 @@ class MultipleShooting(Solver):
     verbose: bool = False
     compiled: bool = False
     time_limit: float | None = None
-    rescue: bool = True
+    feasibility_restoration: bool = True
 
     def __post_init__(self) -> None:
         """Check the options."""
-        whole(self.intervals, "multiple shooting: intervals")
-        instance(self.integrator, Integrator, "multiple shooting: integrator")
-        positive(self.accuracy, "multiple shooting: accuracy", finite=False)
+        check_whole(self.intervals, "multiple shooting: intervals")
+        check_instance(self.integrator, Integrator, "multiple shooting: integrator")
+        check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)
         self.options  # noqa: B018 - checks its own
 
     @property
-    def options(self) -> Backend:
+    def options(self) -> NlpBackend:
         """The backend with its options."""
-        return Backend(
+        return NlpBackend(
             name=self.backend,
             tolerance=self.tolerance,
             max_iterations=self.max_iterations,
@@ -87,7 +76,7 @@ class MultipleShooting(Solver):
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
-        intervals = Intervals.of(ocp, transcription.n, self.integrator, fast=self.compiled)
+        intervals = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
         program = MultipleShootingProgram(self, transcription, intervals)
         program.search.nlp  # noqa: B018 - all symbolic work is done here
         return program
@@ -105,7 +94,7 @@ class MultipleShootingProgram(Program):
 
     solver: MultipleShooting
     transcription: Transcription
-    intervals: Intervals
+    intervals: ShootingGrid
 
     def run(
         self,
@@ -113,31 +102,33 @@ class MultipleShootingProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
         started = perf_counter()
         ocp = self.transcription.ocp
-        data = Data.of(ocp, x0, t0, parameters)
+        data = RunData.of(ocp, x0, t0, parameters)
         z, u = self.first_iterate(data, ocp.first_guess(guess))
         found = self.search.solve(self.transcription.join(z, u), data)
         return self._solution(data, found, perf_counter() - started)
 
     @cached_property
-    def search(self) -> Search:
+    def search(self) -> NlpRun:
         """The backend, and what is done around it."""
         solver = self.solver
-        return Search(
+        return NlpRun(
             transcription=self.transcription,
             options=solver.options,
             accuracy=solver.accuracy,
             error=self._integration_error,
-            rescue=solver.rescue,
+            feasibility_restoration=solver.feasibility_restoration,
         )
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def first_iterate(self, data: Data, guess: Start | None) -> tuple[np.ndarray, np.ndarray]:
+    def first_iterate(
+        self, data: RunData, guess: InitialGuess | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return states and controls of the guess, a free final time with the states."""
         tr, ocp = self.transcription, self.transcription.ocp
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
@@ -147,14 +138,14 @@ class MultipleShootingProgram(Program):
 
     # -- the answer ---------------------------------------------------------------------------
 
-    def _integration_error(self, answer: Answer, data: Data) -> tuple[float, int]:
+    def _integration_error(self, answer: NlpResult, data: RunData) -> tuple[float, int]:
         """By how much half the step moves the end of an interval, relative to 1 + abs(x)."""
         tr = self.transcription
         z, u = tr.split(answer.w)
         schedule = self.intervals.schedule(data, tr.duration(answer.w))
         return self.intervals.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _solution(self, data: Data, found: Found, seconds: float) -> Solution:
+    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
         """The last answer, with the work of all."""
         tr, answer = self.transcription, found.last
         z, u = tr.split(answer.w)

@@ -6,11 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
-from ocp import positive, whole
+from ocp.internal import check_positive, check_whole
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class LineSearchTrial:
     """Controls and the trajectory they produce.
 
     Attributes:
@@ -24,7 +24,7 @@ class Trial:
     cost: float
 
 
-Probe = Callable[[float], Trial]
+Probe = Callable[[float], LineSearchTrial]
 
 
 class StepRule(Protocol):
@@ -32,7 +32,7 @@ class StepRule(Protocol):
 
     def advance(
         self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[Trial, float] | None:
+    ) -> tuple[LineSearchTrial, float] | None:
         """Return the accepted trial and the step to it, or None if no step is acceptable.
 
         Args:
@@ -56,11 +56,11 @@ class FixedStep:
 
     def __post_init__(self) -> None:
         """Check the step."""
-        positive(self.alpha, "fixed step: alpha")
+        check_positive(self.alpha, "fixed step: alpha")
 
     def advance(
         self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[Trial, float] | None:
+    ) -> tuple[LineSearchTrial, float] | None:
         """Return the trial at ``alpha``."""
         return probe(self.alpha), self.alpha
 
@@ -83,12 +83,12 @@ class Armijo:
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        positive(self.decrease, "Armijo: decrease", below=0.5)
-        whole(self.most, "Armijo: most")
+        check_positive(self.decrease, "Armijo: decrease", below=0.5)
+        check_whole(self.most, "Armijo: most")
 
     def advance(
         self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[Trial, float] | None:
+    ) -> tuple[LineSearchTrial, float] | None:
         """Return the first trial that lies low enough, improved once by interpolation."""
         step = first
         for _ in range(self.most):
@@ -100,7 +100,9 @@ class Armijo:
         return None
 
 
-def _improved(probe: Probe, trial: Trial, step: float, minimum: float) -> tuple[Trial, float]:
+def _improved(
+    probe: Probe, trial: LineSearchTrial, step: float, minimum: float
+) -> tuple[LineSearchTrial, float]:
     if abs(minimum - step) > 0.2 * step:
         other = probe(minimum)
         if other.cost < trial.cost:

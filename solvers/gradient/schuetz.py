@@ -11,24 +11,21 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     RK4,
-    Data,
     Euler,
+    InitialGuess,
     Integrator,
     ProblemError,
     Program,
     Solution,
     Solver,
-    Start,
     Status,
     UnsupportedProblem,
     Work,
-    instance,
-    not_negative,
-    whole,
 )
-from solvers.gradient.direction import Direction, Move, search_direction
-from solvers.gradient.line_search import Armijo, FixedStep, StepRule, Trial
-from solvers.gradient.sweeps import Iterate, Objective, Sweeps
+from ocp.internal import RunData, check_instance, check_not_negative, check_whole
+from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
+from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
+from solvers.gradient.line_search import Armijo, FixedStep, LineSearchTrial, StepRule
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ class Schuetz(Solver):
     intervals: int = 75
     integrator: Integrator = field(default_factory=Euler)
     step: StepRule = field(default_factory=FixedStep)
-    direction: Direction = "fletcher-reeves"
+    direction: DirectionRule = "fletcher-reeves"
     gradient: Literal["continuous", "discrete"] = "continuous"
     max_iterations: int = 200
     decrease: float = 1e-4
@@ -69,13 +66,13 @@ class Schuetz(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        whole(self.intervals, "Schuetz: intervals")
-        whole(self.max_iterations, "Schuetz: max_iterations")
-        instance(self.integrator, Integrator, "Schuetz: integrator")
-        instance(self.step, (FixedStep, Armijo), "Schuetz: step")
+        check_whole(self.intervals, "Schuetz: intervals")
+        check_whole(self.max_iterations, "Schuetz: max_iterations")
+        check_instance(self.integrator, Integrator, "Schuetz: integrator")
+        check_instance(self.step, (FixedStep, Armijo), "Schuetz: step")
         for name in ("decrease", "stationarity"):
-            not_negative(getattr(self, name), f"Schuetz: {name}", finite=False)
-        if self.direction not in get_args(Direction):
+            check_not_negative(getattr(self, name), f"Schuetz: {name}", finite=False)
+        if self.direction not in get_args(DirectionRule):
             raise ProblemError(f"direction = {self.direction!r} is not known")
         if self.gradient not in ("continuous", "discrete"):
             raise ProblemError(f"gradient = {self.gradient!r} is neither continuous nor discrete")
@@ -95,10 +92,12 @@ class Schuetz(Solver):
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""
-        instance(ocp, OCP, "Schuetz: the problem")
+        check_instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
         exact = self.gradient == "discrete"
-        sweeps = Sweeps.of(ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled)
+        sweeps = AdjointSweeps.of(
+            ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled
+        )
         return SchuetzProgram(self, sweeps)
 
 
@@ -121,7 +120,7 @@ class SchuetzProgram(Program):
     """
 
     solver: Schuetz
-    sweeps: Sweeps
+    sweeps: AdjointSweeps
 
     def run(
         self,
@@ -129,12 +128,12 @@ class SchuetzProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Descend from the guessed controls, zero unless given."""
         started = perf_counter()
         ocp = self.sweeps.ocp
-        data = Data.of(ocp, x0, t0, parameters)
+        data = RunData.of(ocp, x0, t0, parameters)
         objective, start = Objective(self.sweeps, data), ocp.first_guess(guess)
         u = start.sample("u", objective.nodes[:-1], ocp.model.nu) if start else None
         descent = _Descent(
@@ -187,7 +186,7 @@ class _Descent:
             if accepted is None:
                 return Status.NO_PROGRESS, f"projected gradient {self.residuals[-1]:.3g}"
             trial, step = accepted
-            here, last = objective.differentiated(trial), Move(g, s, slope, step)
+            here, last = objective.differentiated(trial), DescentStep(g, s, slope, step)
             if not here.is_finite:
                 done = len(self.costs)
                 return Status.DIVERGED, f"after {done} iterations the state or its costate blows up"
@@ -202,20 +201,22 @@ class _Descent:
         """Whether no component of the projected gradient is left."""
         return self.residuals[-1] <= self.solver.stationarity
 
-    def _advance(self, s: np.ndarray, slope: float, first: float) -> tuple[Trial, float] | None:
+    def _advance(
+        self, s: np.ndarray, slope: float, first: float
+    ) -> tuple[LineSearchTrial, float] | None:
         """Roll out u + step s, with the step that the rule accepts."""
         u, cost = self.here.trial.u, self.here.trial.cost
         return self.solver.step.advance(
             lambda step: self.objective.rolled_out(u + step * s), cost, slope, first
         )
 
-    def _first_step(self, s: np.ndarray, slope: float, last: Move | None) -> float:
+    def _first_step(self, s: np.ndarray, slope: float, last: DescentStep | None) -> float:
         """The step that promises the decrease of the last one; at first a tenth of the controls."""
         if last is None:
             return 0.1 * (1.0 + np.abs(self.here.trial.u).max()) / float(np.abs(s).max())
         return last.step * last.slope / slope
 
-    def _move_to(self, here: Iterate) -> None:
+    def _move_to(self, here: ControlIterate) -> None:
         self.here = here
         self.costs.append(here.trial.cost)
         self.residuals.append(self.objective.residual(here))

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    Data,
+from ocp import OCP, ProblemError, UnsupportedProblem
+from ocp.internal import (
     ParameterValues,
-    ProblemError,
-    UnsupportedProblem,
-    instance,
-    not_negative,
-    positive,
+    RunData,
+    check_instance,
+    check_not_negative,
+    check_positive,
 )
-from solvers.indirect.newton import NewtonResult
+from solvers.indirect.newton_iteration import NewtonResult
 
 _SMALLEST_ADVANCE = 1e-3
 
@@ -33,7 +31,7 @@ class HorizonContinuation:
 
     def __post_init__(self) -> None:
         """Check the share."""
-        positive(self.first, "continuation: first", below=1.0)
+        check_positive(self.first, "continuation: first", below=1.0)
 
     def check(self, ocp: OCP) -> None:
         """Refuse a free final time: the optimiser, not the share, then sets the horizon."""
@@ -42,7 +40,7 @@ class HorizonContinuation:
                 f"{ocp.name}: no continuation in the horizon where the final time is free"
             )
 
-    def applied(self, data: Data, share: float) -> tuple[Data, float]:
+    def applied(self, data: RunData, share: float) -> tuple[RunData, float]:
         """Return the data, and the share of the horizon to integrate."""
         return data, share
 
@@ -63,8 +61,8 @@ class ParameterContinuation:
 
     def __post_init__(self) -> None:
         """Check the share."""
-        instance(self.name, str, "continuation: name")
-        not_negative(self.first, "continuation: first", below=1.0)
+        check_instance(self.name, str, "continuation: name")
+        check_not_negative(self.first, "continuation: first", below=1.0)
 
     def check(self, ocp: OCP) -> None:
         """Refuse a name that the problem does not know, and a value that does not fit."""
@@ -78,7 +76,7 @@ class ParameterContinuation:
         if shape not in ((), wanted):
             raise ProblemError(f"continuation: easy has shape {shape}, {wanted} is needed")
 
-    def applied(self, data: Data, share: float) -> tuple[Data, float]:
+    def applied(self, data: RunData, share: float) -> tuple[RunData, float]:
         """Return the data with the parameter moved by ``share``, and the whole horizon."""
         wanted = data.values.as_dict()
         easy = np.broadcast_to(np.asarray(self.easy, dtype=float), wanted[self.name].shape)
@@ -88,9 +86,9 @@ class ParameterContinuation:
 
 def advanced(
     continuation: HorizonContinuation | ParameterContinuation,
-    data: Data,
+    data: RunData,
     v: np.ndarray,
-    newton: Callable[[Data, float, np.ndarray], NewtonResult],
+    newton: Callable[[RunData, float, np.ndarray], NewtonResult],
 ) -> Iterator[NewtonResult]:
     """Go from the easy problem to the wanted one; yield every attempt, the wanted one last.
 

@@ -2,15 +2,19 @@
 
 import numpy as np
 
-from ocp import Data, Start
-from solvers.indirect.extremal import Extremals
-from solvers.indirect.segments import Schedule
+from ocp import InitialGuess
+from ocp.internal import RunData
+from solvers.indirect.boundary_value_problem import ExtremalProblem
+from solvers.indirect.shooting_segments import ShootingSchedule
 
 
 def first_unknowns(
-    extremals: Extremals, data: Data, schedule: Schedule, guess: Start | None
+    extremals: ExtremalProblem,
+    data: RunData,
+    schedule: ShootingSchedule,
+    guess: InitialGuess | None,
 ) -> np.ndarray:
-    """Return the unknowns of the boundary value problem, see ``Shape``.
+    """Return the unknowns of the boundary value problem, see ``UnknownsLayout``.
 
     What the guess lacks stands still: states at the start, costates zero.
     """
@@ -28,7 +32,7 @@ def first_unknowns(
 
 
 def _balancing(
-    extremals: Extremals, z: np.ndarray, schedule: Schedule, duration: float
+    extremals: ExtremalProblem, z: np.ndarray, schedule: ShootingSchedule, duration: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the multipliers that best balance the costates of z at both ends."""
     shape, nx = extremals.shape, extremals.shape.nx

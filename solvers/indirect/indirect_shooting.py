@@ -11,32 +11,25 @@ from numpy.typing import ArrayLike
 from ocp import (
     OCP,
     RK4,
-    Data,
+    InitialGuess,
     Integrator,
     ProblemError,
     Program,
     Solution,
     Solver,
-    Start,
     UnsupportedProblem,
     Work,
-    instance,
-    positive,
-    whole,
 )
-from solvers.indirect.continuation import (
-    HorizonContinuation,
-    ParameterContinuation,
-    advanced,
-)
-from solvers.indirect.extremal import Extremals
+from ocp.internal import RunData, check_instance, check_positive, check_whole
+from solvers.indirect.boundary_value_problem import ExtremalProblem
+from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation, advanced
+from solvers.indirect.finite_difference_sensitivities import perturbed_slopes, varied
 from solvers.indirect.first_guess import first_unknowns
-from solvers.indirect.newton import NewtonResult, Solve, newton
+from solvers.indirect.newton_iteration import NewtonResult, Solve, newton
 from solvers.indirect.newton_system import factorised
-from solvers.indirect.perturbed import perturbed_slopes, varied
+from solvers.indirect.newton_verdict import ExtremalMotion, verdict
 from solvers.indirect.second_order import SecondOrder, second_order
-from solvers.indirect.segments import Paths, Schedule
-from solvers.indirect.verdict import Motion, verdict
+from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSchedule
 
 
 @dataclass(frozen=True)
@@ -75,15 +68,15 @@ class IndirectShooting(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        whole(self.segments, "indirect shooting: segments")
-        whole(self.steps, "indirect shooting: steps", least=self.segments)
-        instance(self.integrator, Integrator, "indirect shooting: integrator")
-        whole(self.max_steps, "indirect shooting: max_steps")
-        positive(self.tolerance, "indirect shooting: tolerance")
-        positive(self.delta, "indirect shooting: delta")
+        check_whole(self.segments, "indirect shooting: segments")
+        check_whole(self.steps, "indirect shooting: steps", least=self.segments)
+        check_instance(self.integrator, Integrator, "indirect shooting: integrator")
+        check_whole(self.max_steps, "indirect shooting: max_steps")
+        check_positive(self.tolerance, "indirect shooting: tolerance")
+        check_positive(self.delta, "indirect shooting: delta")
         if self.continuation is not None:
             kinds = (HorizonContinuation, ParameterContinuation)
-            instance(self.continuation, kinds, "indirect shooting: continuation")
+            check_instance(self.continuation, kinds, "indirect shooting: continuation")
         if self.jacobian not in ("exact", "finite-difference"):
             raise ProblemError(
                 f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
@@ -91,7 +84,7 @@ class IndirectShooting(Solver):
 
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""
-        instance(ocp, OCP, "indirect shooting: the problem")
+        check_instance(ocp, OCP, "indirect shooting: the problem")
         for c in ocp.at("path"):
             raise UnsupportedProblem(
                 f"{ocp.name}: indirect shooting takes no path constraint ('{c.name}')"
@@ -101,7 +94,7 @@ class IndirectShooting(Solver):
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-self.steps // self.segments)
-        extremals = Extremals.of(
+        extremals = ExtremalProblem.of(
             ocp, self.segments, per_segment, self.integrator, fast=self.compiled
         )
         return IndirectShootingProgram(self, extremals)
@@ -112,7 +105,7 @@ class IndirectShootingProgram(Program):
     """A boundary value problem, ready for Newton."""
 
     solver: IndirectShooting
-    extremals: Extremals
+    extremals: ExtremalProblem
 
     def run(
         self,
@@ -120,12 +113,12 @@ class IndirectShootingProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data; a guess needs costates, else they start at zero."""
         started = perf_counter()
         ocp = self.extremals.ocp
-        data = Data.of(ocp, x0, t0, parameters)
+        data = RunData.of(ocp, x0, t0, parameters)
         start = ocp.first_guess(guess)
         v = first_unknowns(self.extremals, data, self.schedule(data), start)
         results = [self._newton(data, 1.0, v)]
@@ -141,14 +134,14 @@ class IndirectShootingProgram(Program):
         paths = self.extremals.paths(z, schedule, duration)
         return second_order(self.extremals, v, schedule, paths)
 
-    def schedule(self, data: Data, share: float = 1.0) -> Schedule:
+    def schedule(self, data: RunData, share: float = 1.0) -> ShootingSchedule:
         """Return the integration grid of a run."""
         ext = self.extremals
-        return Schedule.of(ext.ocp, data, ext.shape.segments * ext.steps, share)
+        return ShootingSchedule.of(ext.ocp, data, ext.shape.segments * ext.steps, share)
 
     # -- Newton ------------------------------------------------------------------------
 
-    def _newton(self, data: Data, share: float, v: np.ndarray) -> NewtonResult:
+    def _newton(self, data: RunData, share: float, v: np.ndarray) -> NewtonResult:
         """Iterate (3.50) from ``v``, on a share of the horizon."""
         schedule = self.schedule(data, share)
         return newton(
@@ -160,12 +153,14 @@ class IndirectShootingProgram(Program):
             damped=self.solver.damped,
         )
 
-    def _linearised(self, v: np.ndarray, paths: Paths, schedule: Schedule, x0: np.ndarray) -> Solve:
+    def _linearised(
+        self, v: np.ndarray, paths: SegmentTrajectories, schedule: ShootingSchedule, x0: np.ndarray
+    ) -> Solve:
         slopes = self._slopes(v, paths, schedule)
         return factorised(self.extremals.jacobian(v, paths, schedule, x0, slopes))
 
     def _slopes(
-        self, v: np.ndarray, paths: Paths, schedule: Schedule
+        self, v: np.ndarray, paths: SegmentTrajectories, schedule: ShootingSchedule
     ) -> tuple[np.ndarray, np.ndarray]:
         ext = self.extremals
         z, _, _, duration = ext.shape.split(v, schedule.duration)
@@ -175,9 +170,9 @@ class IndirectShootingProgram(Program):
 
     # -- out ---------------------------------------------------------------------------
 
-    def _solution(self, data: Data, results: list[NewtonResult], seconds: float) -> Solution:
+    def _solution(self, data: RunData, results: list[NewtonResult], seconds: float) -> Solution:
         ext, last, schedule = self.extremals, results[-1], self.schedule(data)
-        motion = Motion.of(ext, last.x, schedule)
+        motion = ExtremalMotion.of(ext, last.x, schedule)
         status, message = verdict(ext, motion, schedule, last, self.solver.max_steps)
         shown = (motion.t, motion.x, motion.costate, motion.u)
         t, x, costate, u = shown if motion.exists else ext.still(data.x0, schedule)

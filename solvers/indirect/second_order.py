@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.indirect.extremal import Extremals
-from solvers.indirect.segments import Paths, Schedule
+from solvers.indirect.boundary_value_problem import ExtremalProblem
+from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSchedule
 
 # Columns of the Lagrangian plane this close to dependent count as a conjugate point.
 _SINGULAR = 1e-9
@@ -26,7 +26,10 @@ class SecondOrder:
 
 
 def second_order(
-    extremals: Extremals, v: np.ndarray, schedule: Schedule, paths: Paths
+    extremals: ExtremalProblem,
+    v: np.ndarray,
+    schedule: ShootingSchedule,
+    paths: SegmentTrajectories,
 ) -> SecondOrder:
     r"""Test the sufficient conditions of a weak local minimum along an extremal.
 
@@ -87,7 +90,11 @@ def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
 
 
 def concave_at(
-    extremals: Extremals, paths: Paths, schedule: Schedule, duration: float, below: float = 0.0
+    extremals: ExtremalProblem,
+    paths: SegmentTrajectories,
+    schedule: ShootingSchedule,
+    duration: float,
+    below: float = 0.0,
 ) -> float | None:
     """Return when H_uu, on the free controls, first has an eigenvalue not above ``below``.
 
@@ -110,7 +117,10 @@ def concave_at(
 
 
 def _final_plane(
-    extremals: Extremals, paths: Paths, nu: np.ndarray, schedule: Schedule
+    extremals: ExtremalProblem,
+    paths: SegmentTrajectories,
+    nu: np.ndarray,
+    schedule: ShootingSchedule,
 ) -> np.ndarray:
     """All (dx, dcostate) that meet the linearised end conditions for some multipliers."""
     t = schedule.t0 + schedule.duration
@@ -126,7 +136,11 @@ def _orthonormal(plane: np.ndarray) -> np.ndarray:
 
 
 def _tangent_curvature(
-    extremals: Extremals, plane: np.ndarray, z0: np.ndarray, mu: np.ndarray, schedule: Schedule
+    extremals: ExtremalProblem,
+    plane: np.ndarray,
+    z0: np.ndarray,
+    mu: np.ndarray,
+    schedule: ShootingSchedule,
 ) -> SecondOrder:
     """The cost-to-go must curve upwards along the start manifold."""
     nx, m = extremals.shape.nx, extremals.shape.n_mu

@@ -17,13 +17,13 @@ class Level(NamedTuple):
 
     Attributes:
         jacobian: J (..., m, n).
-        demand: what J dq/dt should be (..., m).
+        desired_velocity: what J dq/dt should be (..., m).
         activation: between 0 and 1 (...).
         inverse: how J N is inverted.
     """
 
     jacobian: np.ndarray
-    demand: np.ndarray
+    desired_velocity: np.ndarray
     activation: float | np.ndarray
     inverse: Inverse
 
@@ -70,7 +70,7 @@ def _descend(
     u, s, vt = np.linalg.svd(level.jacobian @ free, full_matrices=False)
     v = vt.swapaxes(-1, -2)
     gains = level.inverse.gains(s)
-    missing = level.demand - _times(level.jacobian, velocity)
+    missing = level.desired_velocity - _times(level.jacobian, velocity)
     moved = velocity + _times(v, gains * _times(u.swapaxes(-1, -2), missing))
     size = np.linalg.norm(level.jacobian, axis=(-2, -1))
     used = s > _RANK * size[..., None] if decoupled else gains * s

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ocp import positive
+from ocp.internal import check_positive
 
 
 class Inverse(ABC):
@@ -28,7 +28,7 @@ class Exact(Inverse):
 
     def __post_init__(self) -> None:
         """Check the number."""
-        positive(self.tolerance, "Exact: tolerance")
+        check_positive(self.tolerance, "Exact: tolerance")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return 1/s, or 0."""
@@ -50,7 +50,7 @@ class Damped(Inverse):
 
     def __post_init__(self) -> None:
         """Check the number."""
-        positive(self.factor, "Damped: factor")
+        check_positive(self.factor, "Damped: factor")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return s/(s² + λ²)."""
@@ -78,8 +78,8 @@ class Filtered(Inverse):
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        positive(self.factor, "Filtered: factor")
-        positive(self.threshold, "Filtered: threshold")
+        check_positive(self.factor, "Filtered: factor")
+        check_positive(self.threshold, "Filtered: threshold")
 
     def gains(self, singular_values: np.ndarray) -> np.ndarray:
         """Return s/(s² + λ²(s))."""

@@ -6,7 +6,8 @@ from functools import reduce
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, instance, positive
+from ocp import ProblemError
+from ocp.internal import check_instance, check_positive
 from solvers.kinematic.task import Task, as_column
 
 
@@ -50,7 +51,7 @@ class Repulsion:
             value = getattr(self, name)
             if isinstance(value, ca.SX) and name != "ceiling":
                 continue
-            positive(value, f"repulsion: {name}")
+            check_positive(value, f"repulsion: {name}")
         if not isinstance(self.d_i <= self.d_m, ca.SX) and self.d_i <= self.d_m:
             raise ProblemError(
                 f"repulsion: d_i = {self.d_i} m must be larger than d_m = {self.d_m} m"
@@ -89,7 +90,7 @@ def repel(name: str, *, q: ca.SX, t: ca.SX, distance: ca.SX, repulsion: Repulsio
     Raises:
         ProblemError: if the distance is no expression.
     """
-    instance(repulsion, Repulsion, f"task '{name}': repulsion")
+    check_instance(repulsion, Repulsion, f"task '{name}': repulsion")
     distances = as_column(distance, f"task '{name}': distance")
     d = reduce(ca.fmin, ca.vertsplit(distances))
     return Task(

@@ -30,7 +30,7 @@ class Task:
         error: how far the task is from done, an expression; empty where it has no target.
         activation: between 0 (the task does not exist) and 1, a scalar expression: the
             homogeneous term gain of (3.16).
-        yields: whether the rows may contradict those of higher tasks. Otherwise that is an
+        may_conflict: whether the rows may contradict those of higher tasks. Otherwise that is an
             error in the description.
 
     Raises:
@@ -45,7 +45,7 @@ class Task:
     rate: ca.SX
     error: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     activation: ca.SX = field(default_factory=lambda: ca.SX(1))
-    yields: bool = False
+    may_conflict: bool = False
 
     def __post_init__(self) -> None:
         """Check shapes and symbols."""
@@ -79,7 +79,7 @@ class Task:
         return ca.densify(ca.jacobian(self.value, self.q))
 
     @property
-    def demand(self) -> ca.SX:
+    def desired_velocity(self) -> ca.SX:
         """What J dq/dt has to be (m,): the wanted velocity without that of time alone."""
         return ca.densify(self.rate - ca.jacobian(self.value, self.t))
 
@@ -87,7 +87,7 @@ class Task:
     def is_rigid(self) -> bool:
         """Whether the task is always on and contradicts no other."""
         on = self.activation
-        return not self.yields and on.is_constant() and float(on) == 1.0
+        return not self.may_conflict and on.is_constant() and float(on) == 1.0
 
     def _refuse_foreign_symbols(self, expression: ca.SX, what: str) -> None:
         known = {s.element_hash() for s in ca.vertsplit(ca.vertcat(self.q, self.t))}
@@ -143,7 +143,7 @@ def descend(name: str, *, q: ca.SX, t: ca.SX, potential: ca.SX, gain: float) -> 
 
     .. math:: \dot q = -k \nabla H(q, t)
 
-    Joint limits and dexterity are such potentials. It yields: its n rows contradict those
+    Joint limits and dexterity are such potentials. It may_conflict: its n rows contradict those
     of every higher task, which then win. Source: thesis (3.5) with y = -k ∇H; [Liegeois 1977].
 
     Args:
@@ -161,7 +161,7 @@ def descend(name: str, *, q: ca.SX, t: ca.SX, potential: ca.SX, gain: float) -> 
     if slope.numel() != 1:
         raise ProblemError(f"task '{name}': potential has {slope.numel()} entries, 1 is needed")
     k = float(_gain(gain, 1, name)[0, 0])
-    return Task(name=name, q=q, t=t, value=q, rate=-k * ca.gradient(slope, q), yields=True)
+    return Task(name=name, q=q, t=t, value=q, rate=-k * ca.gradient(slope, q), may_conflict=True)
 
 
 def _require_symbols(name: str, q: ca.SX, t: ca.SX) -> None:

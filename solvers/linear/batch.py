@@ -8,21 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ocp import (
-    OCP,
-    LinearQuadratic,
-    LQData,
-    Matrices,
-    Program,
-    Solution,
-    Solver,
-    Start,
-    Status,
-    linear_quadratic,
-)
-from solvers.linear import recursion
-from solvers.linear.run import Run
-from solvers.linear.stacked import Prediction
+from ocp import OCP, InitialGuess, Program, Solution, Solver, Status, linear_quadratic
+from ocp.internal import LinearQuadratic, LQData, Matrices
+from solvers.linear import regulator_gains as recursion
+from solvers.linear.linear_run import LinearRun
+from solvers.linear.stacked_prediction import StackedPrediction
 
 # Above this condition number of H the inputs have fewer than about eight correct digits.
 _ILL_CONDITIONED = 1e8
@@ -59,7 +49,7 @@ class Batch(Solver):
 class _Stacked:
     """A prediction with its factorised Hessian; None where it is not positive definite."""
 
-    prediction: Prediction
+    prediction: StackedPrediction
     factor: tuple[np.ndarray, bool] | None
 
 
@@ -76,7 +66,7 @@ class BatchProgram(Program):
     lq: LinearQuadratic
 
     @property
-    def prediction(self) -> Prediction:
+    def prediction(self) -> StackedPrediction:
         """The stacked matrices with the declared parameters."""
         stacked = self.fixed or self._stack(self.lq.on(self.lq.declared).matrices)
         return stacked.prediction
@@ -92,10 +82,10 @@ class BatchProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data; a guess is not needed."""
-        run = Run.of(self.lq, x0, t0, parameters)
+        run = LinearRun.of(self.lq, x0, t0, parameters)
         numbers = run.numbers
         stacked = self.fixed or self._stack(numbers.matrices)
         x, u, status, message = self._solve(stacked, numbers, run.data.x0)
@@ -123,7 +113,7 @@ class BatchProgram(Program):
         feedback = np.zeros((steps, m, n))
         if self.solver.prestabilise:
             feedback = recursion.stabilising(matrices, self.lq.ocp.name)
-        prediction = Prediction.of(matrices, feedback)
+        prediction = StackedPrediction.of(matrices, feedback)
         try:
             return _Stacked(prediction, cho_factor(prediction.hessian))
         except (LinAlgError, ValueError):  # not positive definite, or not finite

@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ocp import LinearQuadratic, LQData, Matrices
-from solvers.linear import recursion
-from solvers.linear.stacked import Prediction
+from ocp.internal import LinearQuadratic, LQData, Matrices
+from solvers.linear import regulator_gains as recursion
+from solvers.linear.stacked_prediction import StackedPrediction
 
 # A point as (x (N + 1, n), u (N, m)).
 Trajectory = tuple[np.ndarray, np.ndarray]
 
 
-class Place(NamedTuple):
+class FormPosition(NamedTuple):
     """What a row of the program says, for messages."""
 
     name: str
@@ -22,7 +22,7 @@ class Place(NamedTuple):
     is_control_bound: bool
 
 
-class Vectors(NamedTuple):
+class FormVectors(NamedTuple):
     """What changes from run to run: g, and the bounds l and u of the rows."""
 
     g: np.ndarray
@@ -30,7 +30,7 @@ class Vectors(NamedTuple):
     u: np.ndarray
 
 
-class Form(ABC):
+class MPCForm(ABC):
     """How unknowns and rows are laid out.
 
     The rows of the constraints come last: those of node 0 that have a control, then of the
@@ -49,10 +49,12 @@ class Form(ABC):
         self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
         stage = list(zip(lq.rows, lq.is_control_bound, strict=True))
         first = [
-            Place(*row[:1], 0, row[1]) for row, on in zip(stage, lq.on_control, strict=True) if on
+            FormPosition(*row[:1], 0, row[1])
+            for row, on in zip(stage, lq.on_control, strict=True)
+            if on
         ]
-        later = [Place(name, k, bound) for k in range(1, lq.steps) for name, bound in stage]
-        last = [Place(name, lq.steps, False) for name in lq.end_rows]
+        later = [FormPosition(name, k, bound) for k in range(1, lq.steps) for name, bound in stage]
+        last = [FormPosition(name, lq.steps, False) for name in lq.end_rows]
         self.places = (*first, *later, *last)
 
     @abstractmethod
@@ -60,7 +62,7 @@ class Form(ABC):
         """Fill H and G."""
 
     @abstractmethod
-    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
         """Return g, l and u."""
 
     @abstractmethod
@@ -104,7 +106,7 @@ class Form(ABC):
         ]
 
 
-class Sparse(Form):
+class Sparse(MPCForm):
     """Unknowns (u_0, x_1, u_1, ..., x_N): effort linear in the number of steps."""
 
     def __init__(self, lq: LinearQuadratic) -> None:
@@ -156,7 +158,7 @@ class Sparse(Form):
             _Block(end, self._after[-1:], m.D_f[None]),
         ]
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
         """Return g, l and u."""
         m, on, first = data.matrices, self.lq.on_control, int(self.lq.on_control.sum())
         g = np.empty(self._size)
@@ -170,7 +172,9 @@ class Sparse(Form):
         known = m.D_x[0, on] @ x0
         low[:first] -= known
         high[:first] -= known
-        return Vectors(g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high]))
+        return FormVectors(
+            g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high])
+        )
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""
@@ -192,36 +196,36 @@ class Sparse(Form):
         return np.vstack([first, later])
 
 
-class Condensed(Form):
+class Condensed(MPCForm):
     """Unknowns V of u = -Kx + v (2.83 to 2.91): few and dense, for short horizons."""
 
     def __init__(self, lq: LinearQuadratic) -> None:
         """Wait for the matrices."""
         super().__init__(lq, 0)
-        self._prediction: Prediction | None = None
+        self._prediction: StackedPrediction | None = None
 
     def set_matrices(self, matrices: Matrices) -> None:
         """Stack the matrices."""
         feedback = recursion.stabilising(matrices, self.lq.ocp.name)
-        self._prediction = p = Prediction.of(matrices, feedback)
+        self._prediction = p = StackedPrediction.of(matrices, feedback)
         on, stage = self.lq.on_control, matrices.D @ p.stages
         width = p.end.shape[1]
         rows = [stage[0, on], stage[1:].reshape(-1, width), matrices.D_f @ p.end]
         self.H, self.G = sp.csc_matrix(p.hessian), sp.csc_matrix(np.vstack(rows))
 
     @property
-    def _stacked(self) -> Prediction:
+    def _stacked(self) -> StackedPrediction:
         assert self._prediction is not None
         return self._prediction
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> Vectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
         """Return g, l and u."""
         m, on = data.matrices, self.lq.on_control
         z, x_end = self._stacked.nominal(data, x0)
         rows = (m.D @ z[:, :, None])[:, :, 0]
         known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
         low, high = self._bounds(data)
-        return Vectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
+        return FormVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""

@@ -8,28 +8,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    Data,
-    LinearQuadratic,
-    LQData,
-    Matrices,
-    ProblemError,
-    Program,
-    Solution,
-    Solver,
-    Start,
-    Status,
-    linear_quadratic,
-    positive,
-    start_fault,
-)
-from solvers.linear import recursion
-from solvers.linear.elastic import least_violation
-from solvers.linear.linear_forms import Condensed, Form, Sparse
-from solvers.linear.qp_backends import Answer, Backend, qp_backend
-from solvers.linear.quadratic_program import QP, Softening
-from solvers.linear.run import Run
+from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, Status, linear_quadratic
+from ocp.internal import LinearQuadratic, LQData, Matrices, RunData, check_positive, start_violation
+from solvers.linear import regulator_gains as recursion
+from solvers.linear.linear_forms import Condensed, MPCForm, Sparse
+from solvers.linear.linear_run import LinearRun
+from solvers.linear.qp.least_violation import least_violation
+from solvers.linear.qp.qp_backends import QpBackend, QpResult, qp_backend
+from solvers.linear.qp.quadratic_program import QP, Softening
 
 # A constraint that no point can meet better than this is infeasible, not inaccurate.
 _UNAVOIDABLE = 1e-7
@@ -72,9 +58,9 @@ class LinearMPC(Solver):
         """Check the options."""
         if self.form not in _FORMS:
             raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
-        positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
+        check_positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
         if self.soft is not None:
-            positive(self.soft, "LinearMPC: soft")
+            check_positive(self.soft, "LinearMPC: soft")
 
     def build(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""
@@ -117,11 +103,11 @@ class LinearMPCProgram(Program):
 
     solver: LinearMPC
     lq: LinearQuadratic
-    form: Form
-    backend: Backend
+    form: MPCForm
+    backend: QpBackend
     softening: Softening | None
     _workspace: _Workspace = field(default_factory=_Workspace)
-    remembers: ClassVar[bool] = True
+    is_stateful: ClassVar[bool] = True
 
     def prepare(self, matrices: Matrices) -> None:
         """Take other matrices; nothing happens if they are the last ones."""
@@ -134,7 +120,7 @@ class LinearMPCProgram(Program):
         if self.softening:
             w.soft = QP.of(*self.softening.soften(self.form.H, self.form.G))
 
-    def quadratic_program(self, data: Data) -> QP:
+    def quadratic_program(self, data: RunData) -> QP:
         """Return the (soft) program of a run, for who wants to solve it elsewhere."""
         return self._programs(data.x0, self.lq.on(data))[1]
 
@@ -144,10 +130,10 @@ class LinearMPCProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data, from the last answer unless there is a guess."""
-        run = Run.of(self.lq, x0, t0, parameters)
+        run = LinearRun.of(self.lq, x0, t0, parameters)
         numbers, start = run.numbers, run.data.x0
         hard, qp = self._programs(start, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
@@ -155,7 +141,7 @@ class LinearMPCProgram(Program):
         z, y, status, message = self._verdict(answer, hard, qp)
         if status is Status.SOLVED and self.softening is None:
             # The program has no row for the start: nothing can be done about it.
-            message = start_fault(self.lq.ocp, run.data)
+            message = start_violation(self.lq.ocp, run.data)
             status = Status.INFEASIBLE if message else status
         x, u = self.form.trajectory(z, numbers, start)
         half = recursion.half_slopes(numbers, x, u)
@@ -201,7 +187,7 @@ class LinearMPCProgram(Program):
             return hard, hard
         return hard, w.soft.with_vectors(*self.softening.bounds(*vectors))
 
-    def _warm_start(self, guess: Start | None, numbers: LQData, qp: QP) -> np.ndarray | None:
+    def _warm_start(self, guess: InitialGuess | None, numbers: LQData, qp: QP) -> np.ndarray | None:
         if guess is None:
             return None
         nodes, model = np.linspace(0.0, 1.0, self.lq.steps + 1), self.lq.ocp.model
@@ -213,7 +199,7 @@ class LinearMPCProgram(Program):
         return np.concatenate([z, np.zeros(len(qp.g) - len(z))])
 
     def _verdict(
-        self, answer: Answer, hard: QP, qp: QP
+        self, answer: QpResult, hard: QP, qp: QP
     ) -> tuple[np.ndarray, np.ndarray, Status, str]:
         """Return point, multipliers, status and message."""
         size, rows, found = len(hard.g), len(hard.l), answer.residuals

@@ -10,17 +10,17 @@ from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
-    LinearQuadratic,
+    InitialGuess,
     ProblemError,
     Program,
     Solution,
     Solver,
-    Start,
     linear_quadratic,
     with_stationary_end,
 )
-from solvers.linear import recursion
-from solvers.linear.run import Run
+from ocp.internal import LinearQuadratic
+from solvers.linear import regulator_gains as recursion
+from solvers.linear.linear_run import LinearRun
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,13 @@ class RiccatiProgram(Program):
         return recursion.affine_parts(self._declared, self.lq.on(self.lq.declared))[1]
 
     @cached_property
-    def fixed_gains(self) -> recursion.Gains | None:
+    def fixed_gains(self) -> recursion.RegulatorGains | None:
         """The gains, where neither time nor parameters change them."""
-        return None if self.lq.fixed is None else recursion.gains(self.lq.fixed)
+        return None if self.lq.fixed is None else recursion.regulator_gains(self.lq.fixed)
 
     @cached_property
-    def _declared(self) -> recursion.Gains:
-        return self.fixed_gains or recursion.gains(self.lq.on(self.lq.declared).matrices)
+    def _declared(self) -> recursion.RegulatorGains:
+        return self.fixed_gains or recursion.regulator_gains(self.lq.on(self.lq.declared).matrices)
 
     def run(
         self,
@@ -101,14 +101,14 @@ class RiccatiProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data; a guess is not needed."""
-        run = Run.of(self.lq, x0, t0, parameters)
+        run = LinearRun.of(self.lq, x0, t0, parameters)
         numbers = run.numbers
-        gains = self.fixed_gains or recursion.gains(numbers.matrices)
+        gains = self.fixed_gains or recursion.regulator_gains(numbers.matrices)
         p, k = recursion.affine_parts(gains, numbers)
-        x, u = recursion.roll(numbers, run.data.x0, gains.K, -k)
+        x, u = recursion.closed_loop_rollout(numbers, run.data.x0, gains.K, -k)
         half = recursion.half_slopes(numbers, x, u)
         return run.solution(
             repr(self.solver),

@@ -38,7 +38,7 @@ class CarimaModel(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class CarimaPrediction:
     r"""Outputs y(t + N1) ... y(t + N2) as an affine function of future increments.
 
     .. math:: \hat y = G \, \Delta u + f

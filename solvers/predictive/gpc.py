@@ -7,11 +7,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
-from ocp import Box, ProblemError, Status, instance, not_negative, positive
-from solvers.linear.elastic import least_violation
-from solvers.linear.qp_backends import Backend, qp_backend
-from solvers.linear.quadratic_program import QP
-from solvers.predictive.carima_prediction import CarimaModel, Prediction, history
+from ocp import Box, ProblemError, Status
+from ocp.internal import check_instance, check_not_negative, check_positive
+from solvers.linear.qp.least_violation import least_violation
+from solvers.linear.qp.qp_backends import QpBackend, qp_backend
+from solvers.linear.qp.quadratic_program import QP
+from solvers.predictive.carima_prediction import CarimaModel, CarimaPrediction, history
 from solvers.predictive.diophantine import added, delayed
 
 # A closed loop with a pole beyond this grows, or does not die out.
@@ -66,10 +67,10 @@ class GPC:
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) and not (value is None and name != "n2"):
                 raise ProblemError(f"GPC: {name} = {value!r}, a whole number of steps is needed")
-        positive(self.tolerance, "GPC: tolerance", below=1.0)
-        not_negative(self.weight, "GPC: weight")
+        check_positive(self.tolerance, "GPC: tolerance", below=1.0)
+        check_not_negative(self.weight, "GPC: weight")
         for name in ("increment_bounds", "input_bounds", "output_bounds"):
-            instance(getattr(self, name), Box, f"GPC: {name}")
+            check_instance(getattr(self, name), Box, f"GPC: {name}")
             object.__setattr__(self, name, getattr(self, name).sized(1, f"GPC: {name}"))
 
     def build(self, model: CarimaModel) -> "GPCLaw":
@@ -82,7 +83,7 @@ class GPC:
             ProblemError: if the horizons do not fit, if the increments are not determined,
                 or if the weight is 0 where the plant's zeros then make the loop unstable.
         """
-        instance(model, CarimaModel, "GPC: model")
+        check_instance(model, CarimaModel, "GPC: model")
         first = model.delay + 1
         n1 = first if self.n1 is None else self.n1
         nu = self.n2 - model.delay if self.nu is None else self.nu
@@ -97,14 +98,14 @@ class GPC:
                 f"not n1 = {n1}, n2 = {self.n2}, nu = {nu}, d = {model.delay}"
             )
         law = GPCLaw(
-            self, Prediction(model, n1, self.n2, nu), qp_backend(self.backend, self.tolerance)
+            self, CarimaPrediction(model, n1, self.n2, nu), qp_backend(self.backend, self.tolerance)
         )
         law.check()
         return law
 
 
 @dataclass(frozen=True, eq=False)
-class Move:
+class ControlMove:
     """One step of the law.
 
     Attributes:
@@ -133,8 +134,8 @@ class GPCLaw:
     """
 
     options: GPC
-    prediction: Prediction
-    backend: Backend
+    prediction: CarimaPrediction
+    backend: QpBackend
 
     @cached_property
     def gains(self) -> np.ndarray:
@@ -156,7 +157,7 @@ class GPCLaw:
         through = delayed(np.convolve(model.b, of_y), model.delay + 1)
         return np.roots(added(np.convolve(p.difference, of_du), through))
 
-    def step(self, outputs: ArrayLike, inputs: ArrayLike, reference: ArrayLike) -> Move:
+    def step(self, outputs: ArrayLike, inputs: ArrayLike, reference: ArrayLike) -> ControlMove:
         """Return the next increment of the input.
 
         Args:
@@ -182,7 +183,7 @@ class GPCLaw:
             # Rounding must not leave the bounds of what is applied.
             low, high = self._first(last)
             plan = np.concatenate([[min(max(plan[0], low), high)], plan[1:]])
-        return Move(float(plan[0]), status, message, plan, p.forced @ plan + free)
+        return ControlMove(float(plan[0]), status, message, plan, p.forced @ plan + free)
 
     def check(self) -> None:
         """Raise ``ProblemError`` where the weight 0 does not do."""

@@ -6,13 +6,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import ProblemError, Status, instance, whole
+from ocp import ProblemError, Status
+from ocp.internal import check_instance, check_whole
 from solvers.predictive.carima_prediction import history
 from solvers.predictive.gpc import GPCLaw
 
 
 @runtime_checkable
-class Plant(Protocol):
+class OutputPlant(Protocol):
     """Something with one input and one output: ``models.CarimaPlant``."""
 
     def measure(self, noise: float = 0.0) -> float:
@@ -54,7 +55,7 @@ class GPCRun:
 
 def gpc_loop(
     law: GPCLaw,
-    plant: Plant,
+    plant: OutputPlant,
     reference: ArrayLike,
     steps: int,
     *,
@@ -76,9 +77,9 @@ def gpc_loop(
     Raises:
         ProblemError: if the reference, the noise or the load is too short.
     """
-    instance(law, GPCLaw, "GPC loop: law")
-    instance(plant, Plant, "GPC loop: plant")
-    whole(steps, "GPC loop: steps")
+    check_instance(law, GPCLaw, "GPC loop: law")
+    check_instance(plant, OutputPlant, "GPC loop: plant")
+    check_whole(steps, "GPC loop: steps")
     n2 = law.prediction.n2
     w = history(reference, "reference")
     w = np.full(steps + n2, w[0]) if w.size == 1 else w

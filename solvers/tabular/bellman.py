@@ -6,16 +6,17 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Constraint, Data, Integrator, Signal, Stage
+from ocp import OCP, Constraint, Integrator, Signal
+from ocp.internal import RunData, Stage
 from solvers.tabular.columns import Columns
-from solvers.tabular.grid import Grid
+from solvers.tabular.state_grid import StateGrid
 
 # A bound or constraint counts as met within this, relative to 1 + abs(bound): rounding only.
 _MET = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ValueFunction:
     """What the recursion knows of every point of the grid.
 
     Attributes:
@@ -25,7 +26,7 @@ class Table:
         policy: minimising control, (N, size, nu); without meaning where ``value`` is ``inf``.
     """
 
-    grid: Grid
+    grid: StateGrid
     t: np.ndarray
     value: np.ndarray
     policy: np.ndarray
@@ -82,15 +83,15 @@ class Bellman:
     """
 
     ocp: OCP
-    grid: Grid
-    controls: Grid
+    grid: StateGrid
+    controls: StateGrid
     n: int
     integrator: Integrator
     slack: float
 
     # -- the recursion --------------------------------------------------------------------
 
-    def table(self, data: Data) -> Table:
+    def table(self, data: RunData) -> ValueFunction:
         """Return value function and policy for the numbers of a run."""
         times, common = self.schedule(data)
         value = np.empty((self.n + 1, self.grid.size))
@@ -108,9 +109,9 @@ class Bellman:
             cost[~inside] = np.inf
             total = (matrix @ value[k + 1] + cost).reshape(self.grid.size, -1)
             value[k], policy[k] = self.minimum(total)
-        return Table(self.grid, times, value, policy)
+        return ValueFunction(self.grid, times, value, policy)
 
-    def final(self, data: Data) -> np.ndarray:
+    def final(self, data: RunData) -> np.ndarray:
         """Return the cost of the last node on the terminal set, inf outside it (2.30, 2.31)."""
         x, p = self.grid.points, data.values.at(1.0)[0]
         t = np.array([data.t0 + self.ocp.duration])
@@ -142,7 +143,7 @@ class Bellman:
 
     # -- pairs of state and control ---------------------------------------------------------
 
-    def schedule(self, data: Data) -> tuple[np.ndarray, list[list[np.ndarray]]]:
+    def schedule(self, data: RunData) -> tuple[np.ndarray, list[list[np.ndarray]]]:
         """Return the nodes [s], (N + 1,), and for each step its t, h, p0 and p1."""
         nodes = np.linspace(0.0, 1.0, self.n + 1)
         t = data.t0 + nodes * self.ocp.duration

@@ -9,22 +9,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    RK4,
-    Data,
-    Integrator,
-    Program,
-    Solution,
-    Solver,
-    Stage,
-    Start,
-    Status,
-    Work,
-    instance,
-    positive,
-    whole,
-)
+from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver, Status, Work
+from ocp.internal import RunData, Stage, check_instance, check_positive, check_whole
 from solvers.tabular.one_step import OneStep, one_step
 from solvers.tabular.refusal import refuse_free_ends
 
@@ -70,13 +56,13 @@ class Greedy(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        whole(self.intervals, "Greedy: intervals")
-        whole(self.max_iterations, "Greedy: max_iterations")
-        positive(self.tolerance, "Greedy: tolerance", below=1.0)
+        check_whole(self.intervals, "Greedy: intervals")
+        check_whole(self.max_iterations, "Greedy: max_iterations")
+        check_positive(self.tolerance, "Greedy: tolerance", below=1.0)
 
     def build(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""
-        instance(ocp, OCP, "Greedy: the problem")
+        check_instance(ocp, OCP, "Greedy: the problem")
         refuse_free_ends(ocp, "Greedy")
         stage = Stage.of(ocp, self.integrator, held=True)
         n, options = ocp.steps or self.intervals, _options(self)
@@ -141,12 +127,12 @@ class GreedyProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Go from step to step; of a guess only the first control is used."""
         started = perf_counter()
         ocp, n, m = self.ocp, self.n, self.ocp.model
-        data = Data.of(ocp, x0, t0, parameters)
+        data = RunData.of(ocp, x0, t0, parameters)
         nodes = np.linspace(0.0, 1.0, n + 1)
         guess = ocp.first_guess(guess)
         first = guess.sample("u", nodes[:1], m.nu) if guess else None
@@ -169,7 +155,7 @@ class GreedyProgram(Program):
             solve_time=perf_counter() - started,
         )
 
-    def _walk(self, data: Data, nodes: np.ndarray, u: np.ndarray) -> _Walk:
+    def _walk(self, data: RunData, nodes: np.ndarray, u: np.ndarray) -> _Walk:
         """All steps; after one that fails the control is held."""
         ocp, n, walk = self.ocp, self.n, _Walk([data.x0], [])
         left, right = data.values.on(nodes)
@@ -211,7 +197,7 @@ class GreedyProgram(Program):
             walk.status, walk.message = Status.DIVERGED, f"the state blows up at t = {t:.4g} s"
         return walk
 
-    def _costates(self, walk: _Walk, data: Data, nodes: np.ndarray) -> np.ndarray:
+    def _costates(self, walk: _Walk, data: RunData, nodes: np.ndarray) -> np.ndarray:
         """The derivative of the cost along the controls, held as they are."""
         ocp, x, p = self.ocp, np.array(walk.x), data.values.at(1.0)[0]
         t, (left, right) = data.t0 + nodes * ocp.duration, data.values.on(nodes)

@@ -11,24 +11,21 @@ from ocp import (
     OCP,
     RK4,
     Box,
-    Data,
+    InitialGuess,
     Integrator,
     ProblemError,
     Program,
     Solution,
     Solver,
-    Start,
     Status,
     UnsupportedProblem,
     Work,
-    instance,
-    not_negative,
-    whole,
 )
-from solvers.tabular.bellman import Bellman, Table
-from solvers.tabular.grid import Axis, Grid
-from solvers.tabular.grid_policy import Run, follow
+from ocp.internal import RunData, check_instance, check_not_negative, check_whole
+from solvers.tabular.bellman import Bellman, ValueFunction
+from solvers.tabular.policy_run import PolicyRun, follow_policy
 from solvers.tabular.refusal import refuse_free_ends
+from solvers.tabular.state_grid import Axis, StateGrid
 
 Points = int | tuple[int | Axis, ...]
 # Bytes that a pair of state and control takes: its cost, its sum and their temporaries ...
@@ -83,13 +80,13 @@ class GridDP(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        whole(self.intervals, "GridDP: intervals")
+        check_whole(self.intervals, "GridDP: intervals")
         for name in ("terminal_slack", "accuracy", "memory"):
-            not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
+            check_not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
 
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
-        instance(ocp, OCP, "GridDP: the problem")
+        check_instance(ocp, OCP, "GridDP: the problem")
         refuse_free_ends(ocp, "GridDP")
         self._refuse_equations(ocp)
         m = ocp.model
@@ -114,7 +111,7 @@ class GridDP(Solver):
                 f"{advice}"
             )
 
-    def _check_memory(self, ocp: OCP, states: Grid, controls: Grid) -> None:
+    def _check_memory(self, ocp: OCP, states: StateGrid, controls: StateGrid) -> None:
         pairs, n = states.size * controls.size, ocp.steps or self.intervals
         needed = pairs * (_PER_PAIR + _PER_CORNER * 2.0**ocp.model.nx)
         needed += 8.0 * n * states.size * (1 + ocp.model.nu)
@@ -127,7 +124,7 @@ class GridDP(Solver):
             )
 
 
-def _grid(points: Points, box: Box, names: tuple[str, ...], what: str) -> Grid:
+def _grid(points: Points, box: Box, names: tuple[str, ...], what: str) -> StateGrid:
     """Return the axes, each within its bounds."""
     if not isinstance(points, int | tuple | list):
         raise ProblemError(f"GridDP: {what} = {points!r} is no number of points and no axes")
@@ -137,7 +134,7 @@ def _grid(points: Points, box: Box, names: tuple[str, ...], what: str) -> Grid:
             f"GridDP: {what} has {len(given)} entries for {len(names)}: {', '.join(names)}"
         )
     lower, upper = np.asarray(box.lower), np.asarray(box.upper)
-    return Grid(
+    return StateGrid(
         tuple(
             _axis(axis, float(low), float(high), f"GridDP: {what} of '{name}'")
             for axis, low, high, name in zip(given, lower, upper, names, strict=True)
@@ -176,18 +173,20 @@ class GridDPProgram(Program):
     solver: GridDP
     ocp: OCP
     levels: tuple[Bellman, ...]
-    _kept: dict[str, tuple[bytes, tuple[Table, ...]]] = field(default_factory=dict, repr=False)
+    _kept: dict[str, tuple[bytes, tuple[ValueFunction, ...]]] = field(
+        default_factory=dict, repr=False
+    )
 
     @property
-    def grid(self) -> Grid:
+    def grid(self) -> StateGrid:
         """The points of the states."""
         return self.levels[-1].grid
 
     def tabulate(
         self, *, t0: float = 0.0, parameters: Mapping[str, ArrayLike] | None = None
-    ) -> Table:
+    ) -> ValueFunction:
         """Return value function, policy and reachable sets for these data."""
-        return self._tables(Data.of(self.ocp, t0=t0, parameters=parameters))[-1]
+        return self._tables(RunData.of(self.ocp, t0=t0, parameters=parameters))[-1]
 
     def run(
         self,
@@ -195,11 +194,11 @@ class GridDPProgram(Program):
         x0: ArrayLike | None = None,
         t0: float = 0.0,
         parameters: Mapping[str, ArrayLike] | None = None,
-        guess: Start | None = None,
+        guess: InitialGuess | None = None,
     ) -> Solution:
         """Fill the table, unless it is the last one, and follow its policy; no guess is used."""
         started = perf_counter()
-        data = Data.of(self.ocp, x0, t0, parameters)
+        data = RunData.of(self.ocp, x0, t0, parameters)
         for value, axis, name in zip(data.x0, self.grid.axes, self.ocp.model.x_names, strict=True):
             if not axis.lower <= value <= axis.upper:
                 raise ProblemError(
@@ -208,7 +207,7 @@ class GridDPProgram(Program):
                 )
         before = self._kept.get("tables")
         tables = self._tables(data)
-        runs = [follow(b, table, data) for b, table in zip(self.levels, tables, strict=True)]
+        runs = [follow_policy(b, table, data) for b, table in zip(self.levels, tables, strict=True)]
         run, error = runs[-1], _error(runs)
         status, message = self._verdict(run, error, data)
         work = sum(b.controls.size for b in self.levels)
@@ -233,7 +232,7 @@ class GridDPProgram(Program):
             solve_time=perf_counter() - started,
         )
 
-    def _tables(self, data: Data) -> tuple[Table, ...]:
+    def _tables(self, data: RunData) -> tuple[ValueFunction, ...]:
         key = b"".join([np.float64(data.t0).tobytes(), *[v.tobytes() for v in data.values.values]])
         kept = self._kept.get("tables")
         if kept is None or kept[0] != key:
@@ -241,13 +240,13 @@ class GridDPProgram(Program):
             self._kept["tables"] = kept
         return kept[1]
 
-    def _costates(self, table: Table, run: Run, data: Data) -> np.ndarray:
+    def _costates(self, table: ValueFunction, run: PolicyRun, data: RunData) -> np.ndarray:
         """Slopes of the value function along the trajectory; at its end those of the cost."""
         rows = [table.slope(k, x) for k, x in enumerate(run.x[:-1])]
         final = self.ocp.functions.terminal_gradient(run.x[-1], table.t[-1], data.values.at(1.0)[0])
         return np.nan_to_num(np.vstack([*rows, np.array(final).ravel()]), posinf=0.0, neginf=0.0)
 
-    def _verdict(self, run: Run, error: float, data: Data) -> tuple[Status, str]:
+    def _verdict(self, run: PolicyRun, error: float, data: RunData) -> tuple[Status, str]:
         if run.failed is not None:
             return Status.INFEASIBLE, self._why(run, data)
         if error > self.solver.accuracy * (1.0 + abs(run.cost)):
@@ -257,14 +256,14 @@ class GridDPProgram(Program):
             )
         return Status.SOLVED, ""
 
-    def _why(self, run: Run, data: Data) -> str:
+    def _why(self, run: PolicyRun, data: RunData) -> str:
         """Name what cannot be met: the terminal set, if all else can."""
         k, ocp = run.failed or 0, self.ocp
         where = f"no control is feasible at step {k}, t = {data.t0 + k * self._h:.4g} s"
         names = [c.name for c in ocp.at("terminal")]
         if names:
             free = replace(self.levels[-1], slack=np.inf)
-            if follow(free, free.table(data), data).failed is None:
+            if follow_policy(free, free.table(data), data).failed is None:
                 return f"{where}: terminal constraint '{', '.join(names)}' is out of reach"
         bounded = [
             name
@@ -279,7 +278,7 @@ class GridDPProgram(Program):
         return self.ocp.duration / self.levels[-1].n
 
 
-def _error(runs: list[Run]) -> float:
+def _error(runs: list[PolicyRun]) -> float:
     """Return the estimate of the class docstring; inf where the half grid has no trajectory."""
     j4, j2, j1 = (r.expected for r in runs)
     if not np.isfinite([j2, j1, runs[-1].cost]).all():

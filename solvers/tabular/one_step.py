@@ -6,7 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Box, Constraint, Stage
+from ocp import OCP, Box, Constraint
+from ocp.internal import Stage
 
 # Beyond this a constraint counts as violated, whatever the backend says.
 _VIOLATED = 1e-6

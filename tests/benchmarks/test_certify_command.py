@@ -8,7 +8,8 @@ from benchmarks.__main__ import main
 from benchmarks.cases import all_cases
 from benchmarks.cases.library.certificates import Certificates
 from benchmarks.sweep.row import versions
-from solvers import Certificate, Check, Estimate, MultipleShooting, Verdict
+from solvers import Certificate, MultipleShooting
+from solvers.internal import Check, Estimate, Verdict
 
 
 def certificate(verdict: Verdict) -> Certificate:

@@ -6,12 +6,12 @@ from benchmarks.methods.method import Settings
 from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.guard import Group, run_group
 from benchmarks.sweep.row import CRASHED, TIMED_OUT, Row
-from benchmarks.sweep.task import Task
+from benchmarks.sweep.task import SweepTask
 from tests.benchmarks.test_sweep import QUICK
 
 
 def group(*methods: str, limit: float = 30.0) -> Group:
-    tasks = [Task(QUICK.suite, QUICK.name, m, "", Settings()) for m in methods]
+    tasks = [SweepTask(QUICK.suite, QUICK.name, m, "", Settings()) for m in methods]
     return Group(tuple(tasks), limit, "tests.benchmarks.faulty_child")
 
 

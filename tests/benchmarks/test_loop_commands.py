@@ -11,10 +11,10 @@ from benchmarks.__main__ import main
 from benchmarks.mpc import commands
 from benchmarks.mpc.arm_loop import INSTANTANEOUS
 from benchmarks.mpc.dial import LOOPS
-from benchmarks.mpc.faults import Report
+from benchmarks.mpc.faults import FaultReport
 from benchmarks.mpc.loop_row import read_loops
 
-CLEAN = Report(
+CLEAN = FaultReport(
     subject="cart", steps=10, faults=Counter(), outcomes=Counter(), bad_inputs=0, unnamed=0,
     lies=0, slow=0, refused=0, replayed=3, differing=0,
 )  # fmt: skip

@@ -22,7 +22,7 @@ from benchmarks.report.section import Points
 from benchmarks.report.sheet import SHOWN, Sheet
 from benchmarks.report.success import share
 from benchmarks.sweep.row import RESULTS, TIMED_OUT, Row
-from benchmarks.sweep.task import Task
+from benchmarks.sweep.task import SweepTask
 from tests.benchmarks.chromium import CHROMIUM, opened
 from tests.benchmarks.test_claims import row as arm_row
 
@@ -45,7 +45,7 @@ def suite() -> list[Row]:
             rows.append(row(case=case, solver=method, gap=gap, violation=10.0 ** -(8 + i),
                             solve_time=time, intervals=75 * (j + 1), settings=options,
                             states=3 + i))  # fmt: skip
-    task = Task("arm", "arm-004-sum", "direct-75", "", Settings())
+    task = SweepTask("arm", "arm-004-sum", "direct-75", "", Settings())
     rows.append(replace(Row.lost(task, TIMED_OUT, EVIL, 9.0), when=WHEN))
     return rows
 

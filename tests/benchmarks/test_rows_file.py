@@ -7,11 +7,13 @@ import pytest
 from benchmarks.methods.method import Settings
 from benchmarks.sweep.row import CRASHED, RESULTS, OtherVersion, Row
 from benchmarks.sweep.rows_file import mend, prepare, read_found, read_rows
-from benchmarks.sweep.task import Task
+from benchmarks.sweep.task import SweepTask
 
 
 def lost(case: str) -> Row:
-    return Row.lost(Task("textbook", case, "direct-75", "", Settings()), CRASHED, "a test", 1.0)
+    return Row.lost(
+        SweepTask("textbook", case, "direct-75", "", Settings()), CRASHED, "a test", 1.0
+    )
 
 
 def changed(**changes: object) -> str:

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models import (
+from models.textbook import (
     double_integrator_bounded_energy,
     double_integrator_energy,
     double_integrator_minimum_time,
@@ -15,15 +15,16 @@ from models import (
     turnpike,
 )
 from ocp import OCP, Box, Constraint, Model, Parameter, Signal, Solution, evaluate, solve
-from solvers import Collocation, Verdict
+from solvers import Collocation
 from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
-from solvers.certify.arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.by_arcs import by_arcs
-from solvers.certify.conserved import hamiltonian_check
+from solvers.certify.control_arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.estimates import NoEstimateError
 from solvers.certify.global_evidence import other_data
-from solvers.certify.stretched import Stretched
+from solvers.certify.hamiltonian_check import hamiltonian_check
+from solvers.certify.time_scaled_problem import TimeScaledProblem
+from solvers.internal import Verdict
 from tests.tolerances import DERIVATIVE, STEP
 
 
@@ -144,7 +145,7 @@ def test_an_equation_is_one_law_whose_multiplier_may_have_any_sign(kind):
         "equation bound of u_1" if kind == "box" else "follow equation"
     }
     assert {arc.names[0] for arc in arcs} >= {"lower bound of u_0", "free"}
-    assert not [c for c in Stretched(answer, arcs).ocp.at("path") if c.name == "follow"]
+    assert not [c for c in TimeScaledProblem(answer, arcs).ocp.at("path") if c.name == "follow"]
     estimate = by_arcs(answer)
     assert estimate.method.startswith("indirect")
     assert estimate.cost == pytest.approx(evaluate(answer).cost, abs=1e-4)
@@ -174,7 +175,7 @@ def test_names_of_the_problem_may_be_those_of_the_arcs():
     other = Constraint("horizon of the arcs", ocp.model.x, -9.0, 9.0, at="terminal")
     arc = Parameter("arc", ca.SX.sym("arc"), 1.0)
     taken = replace(ocp, constraints=(*ends, other), parameters=(arc,))
-    stretched = Stretched(*fewest(taken)).ocp
+    stretched = TimeScaledProblem(*fewest(taken)).ocp
     assert {entry.name for entry in stretched.parameters} == {"arc", "arc of the arcs"}
     last = stretched.constraints[-1]
     assert last.name == "horizon of the arcs of the arcs"
@@ -192,7 +193,7 @@ def test_signals_and_free_starts_are_refused():
     }
     signal = Signal("w", ca.SX.sym("w"), np.zeros(3))
     followed = answer.with_(problem=OCP(name="w", parameters=(signal,), **parts))
-    for refusing in (ArcConditions, Stretched):
+    for refusing in (ArcConditions, TimeScaledProblem):
         with pytest.raises(NoArcsError, match="signals"):
             refusing(followed, arcs)
     start = Constraint("start", ocp.model.x, 0.0, 0.0, at="initial")

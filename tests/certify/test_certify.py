@@ -7,16 +7,18 @@ from itertools import chain, repeat
 import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, all_cases
-from models import bryson_denham, double_integrator_energy
+from models.textbook import bryson_denham, double_integrator_energy
 from ocp import Box, Guess, ProblemError, UnsupportedProblem, evaluate, solve
-from solvers import Certificate, Effort, Estimate, MultipleShooting, Verdict, certify
+from solvers import Certificate, CertifyOptions, MultipleShooting, certify
 from solvers.certify.certificate import CONVEXITY, STARTS
-from solvers.certify.certify import GRID, RELATIVE
+from solvers.certify.certify import RELATIVE
 from solvers.certify.estimates import NoEstimateError, by_polish
 from solvers.certify.global_evidence import EXTREMALS, every_extremal, other_starts
+from solvers.certify.grid_conditions import CHECKS as GRID
+from solvers.internal import Estimate, Verdict
 from tests.certify.test_parts import integrator
 
-QUICK = Effort(starts=1, enumerate=False)
+QUICK = CertifyOptions(starts=1, enumerate=False)
 # Polishing the hypersensitive problem takes most of a minute: the tests of the library do it too,
 # and those of the committed certificates hold its two methods against each other.
 QUICKER = [case for case in TEXTBOOK if case.difficulty != "long"]
@@ -127,7 +129,7 @@ def test_the_checks_that_there_was_no_time_for_are_named(monkeypatch):
     module = import_module("solvers.certify.certify")  # the package has a function of that name
     monkeypatch.setattr(module, "perf_counter", lambda: next(instants))
     start = solve(double_integrator_energy(), MultipleShooting(20))
-    certificate = certify(start, Effort(starts=5, seconds=5.0))
+    certificate = certify(start, CertifyOptions(starts=5, seconds=5.0))
     left_out = {c.name for c in certificate.not_checked if "left out: the 5 s" in c.sentence}
     assert left_out == {*GRID, STARTS, EXTREMALS}
     assert len(certificate.estimates) == 2
@@ -146,7 +148,7 @@ def test_of_what_optimum_it_is_a_certificate_is_said_first(energy):
 )
 def test_effort_is_checked(wrong):
     with pytest.raises(ProblemError):
-        Effort(**wrong)
+        CertifyOptions(**wrong)
 
 
 def test_what_no_grid_solves_is_said():

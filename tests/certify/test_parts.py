@@ -7,14 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.cases import LIBRARY
-from models import beam, bryson_denham, double_integrator_energy, van_der_pol
+from models.textbook import beam, bryson_denham, double_integrator_energy, van_der_pol
 from ocp import OCP, Box, Constraint, FreeTime, Model, Signal, evaluate, solve
-from solvers import Certificate, Check, Collocation, Estimate, MultipleShooting, Verdict, polish
+from solvers import Certificate, Collocation, MultipleShooting, polish
 from solvers.certify.certificate import AGREEMENT, agreement
-from solvers.certify.conserved import hamiltonian_check
 from solvers.certify.estimates import extrapolated
 from solvers.certify.global_evidence import convexity, other_data
 from solvers.certify.grid_conditions import grid_checks
+from solvers.certify.hamiltonian_check import hamiltonian_check
+from solvers.internal import Check, Estimate, Verdict
 
 LIMIT = 1e-6
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.cases import arm_scenario
-from models import (
+from models.textbook import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_energy,
@@ -22,10 +22,9 @@ from ocp import (
     MPC,
     OCP,
     Constraint,
-    Data,
     FlightRecorder,
     FreeTime,
-    Outcome,
+    InputSource,
     Parameter,
     Plant,
     ProblemError,
@@ -37,8 +36,9 @@ from ocp import (
     replay,
     solve,
 )
+from ocp.internal import RunData
 from solvers import Collocation, IndirectShooting, Mesh, MultipleShooting, Schuetz, polish
-from solvers.collocation.points import Family
+from solvers.collocation.collocation_points import Family
 from tests.mpc.problems import cart
 from tests.solvers.problems import (
     OTHER,
@@ -267,7 +267,7 @@ def test_a_start_that_blows_up_is_replaced() -> None:
     """The roll-out of u = 0 leaves every bound: the first iterate then stays at the start."""
     ocp = moving(lambda x, u: x**3 + u, x0=1.2, constraints=ends(1.0))
     program = Collocation(20).build(ocp)
-    first = program._first_iterate(Data(ocp.start(), 0.0, ocp.parameter_values()), None)
+    first = program._first_iterate(RunData(ocp.start(), 0.0, ocp.parameter_values()), None)
     assert np.abs(first.x).max() == 1.2
     assert program.run().status is Status.SOLVED
 
@@ -299,7 +299,7 @@ def test_plans_of_a_loop_replay_to_the_last_bit(tmp_path: Path) -> None:
     mpc = MPC(ocp=cart(), solver=Collocation(5, 3), dt=0.1)
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(Plant(ocp=cart()), [1.0, 0.0], 0.5, watch=recorder.watch)
-    assert all(outcome is Outcome.OPTIMAL for outcome in rollout.outcomes)
+    assert all(outcome is InputSource.OPTIMAL for outcome in rollout.outcomes)
     assert all(replay(mpc, tmp_path / "flight", k).is_exact for k in range(5))
 
 

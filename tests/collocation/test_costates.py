@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from models import bryson_denham, van_der_pol
+from models.textbook import bryson_denham, van_der_pol
 from ocp import OCP, Solution, evaluate, solve
 from solvers import Collocation, Mesh, MultipleShooting, polish
-from solvers.collocation.points import Family
+from solvers.collocation.collocation_points import Family
 from tests.solvers.problems import timed_transfer, tracker
 from tests.solvers.test_agreement import slope
 from tests.tolerances import CERTIFIED, COST_DERIVATIVE, MINIMISER, ORDER

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from ocp import ProblemError
 from solvers import Mesh
-from solvers.collocation.mesh import Grid
-from solvers.collocation.points import Family, Points
+from solvers.collocation.collocation_points import CollocationPoints, Family
+from solvers.collocation.mesh import CollocationGrid
 from tests.tolerances import ROUNDING
 
 every = pytest.mark.parametrize(
@@ -21,7 +21,7 @@ every = pytest.mark.parametrize(
 @every
 def test_quadrature_is_as_exact_as_its_order(family: Family, degree: int) -> None:
     """Exact up to degree 2d - 2 (Radau) and 2d - 1 (Gauss), and not beyond."""
-    points = Points.of(family, degree)
+    points = CollocationPoints.of(family, degree)
     order = 2 * degree - (family == "radau")
     for power in range(order + 1):
         error = abs(points.b @ points.c**power - 1.0 / (power + 1))
@@ -30,7 +30,7 @@ def test_quadrature_is_as_exact_as_its_order(family: Family, degree: int) -> Non
 
 @every
 def test_stages_integrate_polynomials_up_to_their_degree(family: Family, degree: int) -> None:
-    points = Points.of(family, degree)
+    points = CollocationPoints.of(family, degree)
     for power in range(degree):
         exact = points.c ** (power + 1) / (power + 1)
         np.testing.assert_allclose(points.A @ points.c**power, exact, atol=ROUNDING)
@@ -41,7 +41,7 @@ def test_stages_integrate_polynomials_up_to_their_degree(family: Family, degree:
 
 def test_known_tableaus() -> None:
     """Radau IIA of order 3 and Gauss of order 4 [Hairer & Wanner 1996, IV.5]."""
-    radau, gauss = Points.of("radau", 2), Points.of("gauss", 2)
+    radau, gauss = CollocationPoints.of("radau", 2), CollocationPoints.of("gauss", 2)
     np.testing.assert_allclose(radau.A, [[5 / 12, -1 / 12], [3 / 4, 1 / 4]], atol=ROUNDING)
     root = np.sqrt(3.0) / 6.0
     np.testing.assert_allclose(gauss.A, [[1 / 4, 1 / 4 - root], [1 / 4 + root, 1 / 4]])
@@ -49,7 +49,7 @@ def test_known_tableaus() -> None:
 
 @every
 def test_controls_at_the_points_and_their_coefficients(family: Family, degree: int) -> None:
-    points = Points.of(family, degree)
+    points = CollocationPoints.of(family, degree)
     np.testing.assert_allclose(points.B.sum(axis=1), 1.0, atol=ROUNDING)
     assert (points.B >= 0.0).all()
     assert np.linalg.cond(points.B) < 200.0
@@ -64,7 +64,7 @@ def test_grids_know_their_nodes(cells: list[tuple[float, int]], family: Family) 
     widths = np.array([width for width, _ in cells])
     edges = np.append(0.0, np.cumsum(widths) / widths.sum())
     edges[-1] = 1.0
-    grid = Grid.of(Mesh(tuple(edges), tuple(d for _, d in cells)), family)
+    grid = CollocationGrid.of(Mesh(tuple(edges), tuple(d for _, d in cells)), family)
     np.testing.assert_array_equal(grid.nodes[grid.edge_nodes], edges)
     np.testing.assert_array_equal(grid.nodes[grid.point_nodes], grid.at)
     inside = len(cells) * (family == "gauss")
@@ -76,9 +76,9 @@ def test_grids_know_their_nodes(cells: list[tuple[float, int]], family: Family) 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Points.of("lobatto", 3),  # pyright: ignore[reportArgumentType]
-        lambda: Points.of("radau", 1),
-        lambda: Points.of("gauss", 6),
+        lambda: CollocationPoints.of("lobatto", 3),  # pyright: ignore[reportArgumentType]
+        lambda: CollocationPoints.of("radau", 1),
+        lambda: CollocationPoints.of("gauss", 6),
         lambda: Mesh((0.0, 1.0), ()),
         lambda: Mesh((0.0, 1.0), (3, 3)),
         lambda: Mesh((0.0, 0.5, 0.5, 1.0), (3, 3, 3)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import (
+from models.textbook import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_minimum_time,
@@ -16,8 +16,8 @@ from models import (
     van_der_pol,
 )
 from ocp import OCP, ProblemError, Status, UnsupportedProblem, evaluate, solve
-from solvers import Collocation, MultipleShooting, polish, refined
-from solvers.collocation.points import Family
+from solvers import Collocation, MultipleShooting, polish, refine_mesh
+from solvers.collocation.collocation_points import Family
 from tests.solvers.problems import OTHER, tracker
 from tests.solvers.test_failures import braked
 from tests.tolerances import CERTIFIED, ROUNDING
@@ -38,7 +38,7 @@ def test_certified_optima(make: Callable[[], OCP], reference: float, points: Fam
     """To more than 8 digits, by the solver's word and by the referee's."""
     ocp = make()
     start = solve(ocp, MultipleShooting(40))
-    found = refined(start, solver=Collocation(10, points=points))
+    found = refine_mesh(start, solver=Collocation(10, points=points))
     solution, verdict = found.solution, evaluate(found.solution)
     assert solution.status is Status.SOLVED
     assert solution.cost == pytest.approx(reference, rel=1e-9)
@@ -53,7 +53,7 @@ def test_certified_optima(make: Callable[[], OCP], reference: float, points: Fam
 @pytest.mark.parametrize("name", ["arm-001", "arm-002", "arm-003", "arm-004"])
 def test_the_arm_agrees_with_its_extremal(name: str) -> None:
     """Its cost is C1 only, so the quadrature is refined as well: the true cost has 10 digits."""
-    solution = refined(solve(arm_scenario(name).ocp(), MultipleShooting(75))).solution
+    solution = refine_mesh(solve(arm_scenario(name).ocp(), MultipleShooting(75))).solution
     assert solution.status is Status.SOLVED
     extremal = polish(solution, accuracy=1e-10)
     assert evaluate(solution).cost == pytest.approx(extremal.cost, rel=CERTIFIED)
@@ -63,7 +63,7 @@ def test_the_arm_agrees_with_its_extremal(name: str) -> None:
 @pytest.mark.slow
 def test_history_tells_where_the_mesh_went() -> None:
     """Hypersensitive: short intervals at both ends, long ones between; nothing is coarsened."""
-    found = refined(solve(hypersensitive(), MultipleShooting(40)))
+    found = refine_mesh(solve(hypersensitive(), MultipleShooting(40)))
     sizes = [sum(r.mesh.degrees) for r in found.rounds]
     assert sizes == sorted(set(sizes))
     for coarse, fine in pairwise(found.rounds):
@@ -81,7 +81,7 @@ def test_history_tells_where_the_mesh_went() -> None:
 def test_deterministic_and_with_the_data_of_its_start() -> None:
     start = MultipleShooting(30).build(tracker()).run(x0=[-0.4, 0.6], t0=0.7, parameters=OTHER)
     # 6 intervals: the knots of the signals are edges.
-    one, other = (refined(start, solver=Collocation(6)) for _ in range(2))
+    one, other = (refine_mesh(start, solver=Collocation(6)) for _ in range(2))
     np.testing.assert_array_equal(one.solution.u, other.solution.u)
     assert one.rounds[-1].mesh == other.rounds[-1].mesh
     assert one.solution.t[0] == 0.7
@@ -90,7 +90,7 @@ def test_deterministic_and_with_the_data_of_its_start() -> None:
 
 
 def test_says_so_where_the_rounds_are_too_few() -> None:
-    found = refined(solve(rayleigh(), MultipleShooting(40)), rounds=2)
+    found = refine_mesh(solve(rayleigh(), MultipleShooting(40)), rounds=2)
     assert found.solution.status is Status.INACCURATE
     assert "still wrong by" in found.solution.message
     assert len(found.rounds) == 2
@@ -98,14 +98,14 @@ def test_says_so_where_the_rounds_are_too_few() -> None:
 
 def test_a_failing_round_ends_it() -> None:
     start = solve(braked(), MultipleShooting(20))
-    found = refined(start)
+    found = refine_mesh(start)
     assert found.solution.status is Status.INFEASIBLE
     assert len(found.rounds) == 1
 
 
 def test_what_it_does_not_see() -> None:
     """The switch of the minimum time lies in an interval whose dynamics are integrated exactly."""
-    found = refined(
+    found = refine_mesh(
         solve(double_integrator_minimum_time(), MultipleShooting(40)),
         solver=Collocation(5, 3),
     )
@@ -114,7 +114,7 @@ def test_what_it_does_not_see() -> None:
     assert evaluate(found.solution).cost > 2.0 + 1e-4
     # And a state bound is kept at the points only: between them the path gains by it.
     start = solve(bryson_denham(), MultipleShooting(40))
-    verdict = evaluate(refined(start).solution)
+    verdict = evaluate(refine_mesh(start).solution)
     assert 4.0 * (1.0 - 1e-5) < verdict.cost < 4.0 - 1e-7
     assert verdict.violation > 1e-8
 
@@ -122,9 +122,9 @@ def test_what_it_does_not_see() -> None:
 @pytest.mark.parametrize("options", [{"accuracy": 0.0}, {"accuracy": np.nan}, {"rounds": 0}])
 def test_bad_options(options: dict) -> None:
     with pytest.raises(ProblemError):
-        refined(solve(van_der_pol(), MultipleShooting(5)), **options)
+        refine_mesh(solve(van_der_pol(), MultipleShooting(5)), **options)
 
 
 def test_refuses_discrete_time() -> None:
     with pytest.raises(UnsupportedProblem, match="discrete-time"):
-        refined(solve(discrete_double_integrator(5, 0.1), MultipleShooting()))
+        refine_mesh(solve(discrete_double_integrator(5, 0.1), MultipleShooting()))

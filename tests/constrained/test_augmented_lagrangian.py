@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models import bryson_denham
+from models.textbook import bryson_denham
 from ocp import (
     Constraint,
     ProblemError,
@@ -16,13 +16,8 @@ from ocp import (
     evaluate,
     solve,
 )
-from solvers import (
-    AugmentedLagrangian,
-    IndirectShooting,
-    MultipleShooting,
-    Schuetz,
-)
-from solvers.constrained.relaxed import MULTIPLIER, PENALTY, SCALE, Relaxed
+from solvers import AugmentedLagrangian, IndirectShooting, MultipleShooting, Schuetz
+from solvers.constrained.relaxed_problem import MULTIPLIER, PENALTY, SCALE, RelaxedProblem
 from tests.solvers.problems import ends, point
 
 N = 60
@@ -106,7 +101,7 @@ def test_terminal_equation_for_schuetz() -> None:
 
 def test_relaxed_cost_against_differences() -> None:
     """P(c, mu, rho) = (max(0, mu + rho c)^2 - mu^2) / (2 rho), and its slope in c."""
-    relaxed = Relaxed.of(under_a_ceiling(), N).ocp
+    relaxed = RelaxedProblem.of(under_a_ceiling(), N).ocp
     cost = relaxed.functions.running_cost
     bare = under_a_ceiling().functions.running_cost
     names = [entry.name for entry in relaxed.parameters]
@@ -125,7 +120,7 @@ def test_relaxed_cost_against_differences() -> None:
 
 
 def test_relaxed_problem_is_honest_about_its_smoothness() -> None:
-    relaxed = Relaxed.of(under_a_ceiling(), N).ocp
+    relaxed = RelaxedProblem.of(under_a_ceiling(), N).ocp
     assert relaxed.smoothness == 1
     assert not relaxed.constraints
     assert not relaxed.state_bounds.is_active

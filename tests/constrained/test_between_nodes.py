@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario, required_clearance, soft_optimum
-from models import discrete_double_integrator
+from models.textbook import discrete_double_integrator
 from ocp import Box, ProblemError, Status, UnsupportedProblem, evaluate, solve
 from solvers import BetweenNodes, MultipleShooting, Schuetz
 from tests.constrained.test_augmented_lagrangian import ceiling_cost, under_a_ceiling

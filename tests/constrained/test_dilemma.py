@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import BarrierCost, bounded_ocp, unbounded_ocp
+from models.textbook import BarrierCost, bounded_ocp, unbounded_ocp
 from ocp import ProblemError, Solver, Status, evaluate, solve
-from solvers import IndirectShooting, MultipleShooting, Schuetz, raise_until_clear
+from solvers import IndirectShooting, MultipleShooting, Schuetz, penalty_continuation
 
 SCENARIO = arm_scenario("arm-001")
 HARD = SCENARIO.ocp(weight=0.0, clearance=SCENARIO.radius)
@@ -41,7 +41,7 @@ def test_an_unbounded_cost_breaks_with_a_clean_status(name: str, solver: Solver,
 
 def test_the_price_is_raised_until_the_path_is_clear() -> None:
     soft = bounded_ocp(SCENARIO, weight=LOW)
-    solution = raise_until_clear(soft, HARD, Schuetz.sound(), parameter="weight")
+    solution = penalty_continuation(soft, HARD, Schuetz.sound(), parameter="weight")
     assert solution.status is Status.STATIONARY
     assert violation_of(solution) <= 1e-6
     steps = solution.history["violation"]
@@ -53,7 +53,7 @@ def test_where_there_is_no_clear_path_no_price_is_high_enough() -> None:
     scenario = arm_scenario("arm-034")
     hard = scenario.ocp(weight=0.0, clearance=scenario.radius)
     soft, direct = bounded_ocp(scenario), MultipleShooting(40)
-    solution = raise_until_clear(soft, hard, direct, parameter="weight", most=2)
+    solution = penalty_continuation(soft, hard, direct, parameter="weight", most=2)
     assert solution.status is Status.INFEASIBLE
     assert "clearance" in solution.message
 
@@ -63,7 +63,7 @@ def test_what_is_refused() -> None:
     for bad in ({"parameter": "price"}, {"factor": 1.0}, {"most": 0}):
         options = {"parameter": "weight", **bad}
         with pytest.raises(ProblemError):
-            raise_until_clear(soft, HARD, Schuetz.sound(), **options)  # pyright: ignore
+            penalty_continuation(soft, HARD, Schuetz.sound(), **options)  # pyright: ignore
     with pytest.raises(ProblemError):
         BarrierCost(0.0, 0.5)
 
@@ -72,8 +72,8 @@ def test_a_price_that_cannot_be_raised_is_refused() -> None:
     scenario = arm_scenario("arm-001")
     soft, hard = bounded_ocp(scenario, weight=0.0), scenario.ocp(clearance=scenario.radius)
     with pytest.raises(ProblemError, match="must be positive"):
-        raise_until_clear(soft, hard, MultipleShooting(20), parameter="weight")
+        penalty_continuation(soft, hard, MultipleShooting(20), parameter="weight")
     with pytest.raises(ProblemError, match="must be positive"):
-        raise_until_clear(
+        penalty_continuation(
             bounded_ocp(scenario), hard, MultipleShooting(20), parameter="weight", tolerance=0.0
         )

@@ -7,36 +7,38 @@ import numpy as np
 import pytest
 
 from benchmarks.mistakes import problems as of
-from ocp import OCP, Box, Constraint, Data, FreeTime, Guess, Model, Signal
-from solvers import Cause, MultipleShooting, Severity, diagnose
+from ocp import OCP, Box, Constraint, FreeTime, Guess, Model, Signal
+from ocp.internal import RunData
+from solvers import MultipleShooting, diagnose
+from solvers.diagnose.checks.curvature import curvature
+from solvers.diagnose.checks.degrees import degrees
+from solvers.diagnose.checks.duplicate import duplicate
+from solvers.diagnose.checks.grid import grid
+from solvers.diagnose.checks.guess import guess
+from solvers.diagnose.checks.influence import influence
+from solvers.diagnose.checks.instants import instants
+from solvers.diagnose.checks.kink import kink
+from solvers.diagnose.checks.not_finite import not_finite
+from solvers.diagnose.checks.scaling import scaling
+from solvers.diagnose.checks.time_kind import time_kind
+from solvers.diagnose.checks.unbounded import unbounded
+from solvers.diagnose.checks.unreachable import unreachable
+from solvers.diagnose.checks.vacuous import vacuous
 from solvers.diagnose.conditioning import conditioning
-from solvers.diagnose.curvature import curvature
-from solvers.diagnose.degrees import degrees
-from solvers.diagnose.duplicate import duplicate
-from solvers.diagnose.elastic import Demand, Elastic
-from solvers.diagnose.examine import _BEFORE
+from solvers.diagnose.diagnose import _BEFORE
+from solvers.diagnose.elastic_program import Demand, ElasticProgram
 from solvers.diagnose.finding import Finding
-from solvers.diagnose.grid import grid
-from solvers.diagnose.guess import guess
-from solvers.diagnose.influence import influence
-from solvers.diagnose.instants import instants
-from solvers.diagnose.kink import kink
-from solvers.diagnose.not_finite import not_finite
-from solvers.diagnose.scaling import scaling
-from solvers.diagnose.subject import Subject
-from solvers.diagnose.time_kind import time_kind
-from solvers.diagnose.unbounded import unbounded
-from solvers.diagnose.unreachable import unreachable
-from solvers.diagnose.vacuous import vacuous
+from solvers.diagnose.subject import DiagnosedProblem
+from solvers.internal import Cause, Severity
 from tests.tolerances import MINIMISER
 
 # What the elastic problem leaves over: IPOPT's 1e-8, and the weight of its tie break.
 ELASTIC = 1e-3
 
 
-def subject(ocp: OCP, intervals: int = 20) -> Subject:
-    data = Data(ocp.start(), 0.0, ocp.parameter_values())
-    return Subject(ocp, data, MultipleShooting(intervals))
+def subject(ocp: OCP, intervals: int = 20) -> DiagnosedProblem:
+    data = RunData(ocp.start(), 0.0, ocp.parameter_values())
+    return DiagnosedProblem(ocp, data, MultipleShooting(intervals))
 
 
 def only(check, ocp: OCP) -> Finding:
@@ -347,7 +349,7 @@ def test_cost_that_falls_without_limit():
 def test_conflict_of_a_line():
     """x >= 1 and x <= 0 exclude each other, y <= 5 has no part in it."""
     w = ca.MX.sym("w", 2)
-    elastic = Elastic(
+    elastic = ElasticProgram(
         w=w,
         p=ca.MX(0, 1),
         hard=ca.MX(0, 1),

@@ -10,7 +10,8 @@ from benchmarks.mistakes import MISTAKES, SOUND
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.judge import GOAL, judged, share
 from ocp import Box, Euler, ProblemError, solve
-from solvers import Cause, Diagnosis, Finding, MultipleShooting, Severity, diagnose, polish
+from solvers import Diagnosis, Finding, MultipleShooting, diagnose, polish
+from solvers.internal import Cause, Severity
 from tests.ocp.problems import energy, lag, pendulum
 
 # Where finding and plant differ, and the page says why.

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from qpsolvers import solve_qp
 
 from ocp import ProblemError
-from solvers import Damped, Exact, Filtered, Inverse, Level, prioritised_velocity
+from solvers import Damped, Exact, Filtered
+from solvers.internal import Inverse, Level, prioritised_velocity
 
 # The issue: 3.11 against a QP, and the first task against whatever the second is.
 QP = 1e-9
@@ -28,7 +29,7 @@ def lexicographic(levels: list[Level], n: int) -> np.ndarray:
         # min |J x - r|^2 subject to A x = b; the null space of A is explicit.
         x0 = np.linalg.lstsq(a, b)[0] if len(a) else np.zeros(n)
         basis = np.linalg.svd(a)[2][np.linalg.matrix_rank(a) if len(a) else 0 :].T
-        z = np.linalg.lstsq(level.jacobian @ basis, level.demand - level.jacobian @ x0)[0]
+        z = np.linalg.lstsq(level.jacobian @ basis, level.desired_velocity - level.jacobian @ x0)[0]
         a, b = np.vstack([a, level.jacobian]), np.append(b, level.jacobian @ (x0 + basis @ z))
     return np.linalg.lstsq(a, b)[0]
 
@@ -51,7 +52,7 @@ def test_two_tasks_are_a_quadratic_program(seed: int, n: int, rows: list[int]) -
     """(3.11) is the least dq that does both: min |x|^2 with J1 x = r1, J2 x = r2."""
     levels = drawn(seed, n, rows)
     a = np.vstack([level.jacobian for level in levels])
-    b = np.concatenate([level.demand for level in levels])
+    b = np.concatenate([level.desired_velocity for level in levels])
     x = solve_qp(np.eye(n), np.zeros(n), A=a, b=b, solver="quadprog")
     assert x is not None
     dq = prioritised_velocity(levels, n, decoupled=True)
@@ -71,8 +72,8 @@ def test_the_formula_of_the_thesis(seed: int, alpha: float, inverse: Inverse) ->
         return vt.T @ np.diag(inverse.gains(s)) @ u.T
 
     n1 = np.eye(3) - sharp(j1) @ j1
-    dq1 = sharp(j1) @ first.demand
-    expected = dq1 + alpha * sharp(j2 @ n1) @ (second.demand - j2 @ dq1)
+    dq1 = sharp(j1) @ first.desired_velocity
+    expected = dq1 + alpha * sharp(j2 @ n1) @ (second.desired_velocity - j2 @ dq1)
     levels = [first._replace(inverse=inverse), second._replace(inverse=inverse, activation=alpha)]
     dq = prioritised_velocity(levels, 3, decoupled=False)
     np.testing.assert_allclose(dq, expected, atol=1e-10)

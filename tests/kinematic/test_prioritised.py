@@ -103,7 +103,7 @@ def test_velocities_stay_bounded_through_singular_configurations(
     for q, t, dq in zip(run.q[::20], run.t[::20], run.velocity[::20], strict=False):
         bound = 0.0
         for level in program.at(q, t):
-            reach = np.linalg.norm(level.demand) + np.linalg.norm(level.jacobian) * bound
+            reach = np.linalg.norm(level.desired_velocity) + np.linalg.norm(level.jacobian) * bound
             bound += largest * level.activation * reach
         assert np.linalg.norm(dq) <= bound + 1e-9
     tasks = (task, *others)
@@ -334,7 +334,7 @@ def test_linearly_dependent_tasks(tasks: Any) -> None:
     name = tasks[-1].name
     with pytest.raises(ProblemError, match=f"task '{name}' has rows that depend linearly"):
         PrioritisedKinematics(tasks).build()
-    yielding = (*tasks[:-1], task(name, tasks[-1].value, yields=True))
+    yielding = (*tasks[:-1], task(name, tasks[-1].value, may_conflict=True))
     assert np.isfinite(PrioritisedKinematics(yielding).build().velocity(START)).all()
 
 

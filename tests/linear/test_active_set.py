@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solvers.linear.active_set import ActiveSet
-from solvers.linear.quadratic_program import QP, residuals
+from solvers.linear.qp.active_set import ActiveSet
+from solvers.linear.qp.quadratic_program import QP, residuals
 
 
 def program(h, g, matrix, low, high) -> QP:

@@ -20,8 +20,8 @@ from models import (
 )
 from ocp import OCP, Box, Constraint, Model, ProblemError, Solution, Status, evaluate, solve
 from solvers import LinearMPC, MultipleShooting
-from solvers.linear.qp_backends import NamedBackend, known_backends, qp_backend
-from solvers.linear.quadratic_program import residuals
+from solvers.linear.qp.qp_backends import NamedBackend, known_backends, qp_backend
+from solvers.linear.qp.quadratic_program import residuals
 from tests import tolerances
 
 BOUND, STEPS, DT = 2.0, 160, 0.05

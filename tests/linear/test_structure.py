@@ -15,7 +15,6 @@ from ocp import (
     RK4,
     Box,
     Constraint,
-    Data,
     Model,
     ProblemError,
     Signal,
@@ -26,6 +25,7 @@ from ocp import (
     solve,
     with_input_rate,
 )
+from ocp.internal import RunData
 from solvers import LinearMPC, MultipleShooting, Riccati
 from tests.linear.problems import general
 
@@ -83,7 +83,7 @@ def test_arrays_have_their_shapes_and_give_the_cost_back(n, m, steps, seed):
         control_bounds=Box(-1.0, np.inf), state_bounds=Box(-np.ones(n), np.full(n, np.inf)),
     )  # fmt: skip
     lq = linear_quadratic(ocp)
-    data = lq.on(Data.of(lq.ocp))
+    data = lq.on(RunData.of(lq.ocp))
     assert data.matrices.A.shape == (steps, n, n)
     assert data.matrices.D_x.shape == (steps, n + m, n)
     assert data.matrices.D_u.shape == (steps, n + m, m)
@@ -99,7 +99,7 @@ def test_arrays_have_their_shapes_and_give_the_cost_back(n, m, steps, seed):
 
 def test_matrices_that_do_not_change_are_one_object():
     lq = linear_quadratic(problem())
-    first, second = (lq.on(Data.of(lq.ocp, [k, 0.0])) for k in range(2))
+    first, second = (lq.on(RunData.of(lq.ocp, [k, 0.0])) for k in range(2))
     assert first.matrices is second.matrices
     assert linear_quadratic(general()).fixed is None
 

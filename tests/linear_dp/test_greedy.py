@@ -2,23 +2,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models import (
-    stable_plant,
-    thesis_regulator,
-    unstable_plant,
-    van_der_pol,
-)
-from ocp import (
-    OCP,
-    Box,
-    Constraint,
-    Model,
-    ProblemError,
-    Status,
-    costates_along,
-    evaluate,
-    solve,
-)
+from models import stable_plant, thesis_regulator, unstable_plant
+from models.textbook import van_der_pol
+from ocp import OCP, Box, Constraint, Model, ProblemError, Status, costates_along, evaluate, solve
 from solvers import Greedy, MultipleShooting
 from tests.linear_dp.problems import line, scalar, tracking, unstable_mass, walk
 

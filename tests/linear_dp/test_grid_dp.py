@@ -16,7 +16,7 @@ from ocp import (
     solve,
 )
 from solvers import Axis, GridDP, MultipleShooting
-from solvers.tabular.grid import Grid
+from solvers.tabular.state_grid import StateGrid
 from tests.linear_dp.problems import line, scalar, scalar_cost, tracking, unstable_mass, walk
 from tests.tolerances import ROUNDING
 
@@ -176,7 +176,7 @@ def test_terminal_equations_need_slack():
 
 
 def test_an_infinite_corner_counts_only_with_a_weight():
-    grid = Grid((Axis(0.0, 2.0, 3), Axis(0.0, 2.0, 3)))
+    grid = StateGrid((Axis(0.0, 2.0, 3), Axis(0.0, 2.0, 3)))
     value = np.zeros(9)
     value[8] = np.inf
     points = np.array(

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from benchmarks.cases import LIBRARY
-from models import goddard, pendulum_minimum_time, polar_arm, two_link_arm_minimum_time
+from models.textbook import goddard, pendulum_minimum_time, polar_arm, two_link_arm_minimum_time
 from ocp import OCP
 from tests.tolerances import CERTIFIED
 

@@ -11,7 +11,8 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve, minimize
 
 from benchmarks.cases import LIBRARY
-from models import mass_spring_damper, stable_plant, two_link_arm_energy, unstable_plant
+from models import mass_spring_damper, stable_plant, unstable_plant
+from models.textbook import two_link_arm_energy
 from tests.tolerances import CERTIFIED, DERIVATIVE, ROUNDING, STEP
 
 CASES = {case.name: case for case in LIBRARY}

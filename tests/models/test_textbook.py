@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_bvp, solve_ivp
 
-from models import (
+from models.textbook import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_energy,
@@ -15,7 +15,7 @@ from models import (
     rayleigh,
     van_der_pol,
 )
-from ocp import OCP, FreeTime, ProblemError, derive
+from ocp import OCP, FreeTime, ProblemError, minimum_principle
 
 PROBLEMS = (
     bryson_denham,
@@ -48,7 +48,7 @@ def test_energy_optimum_is_6() -> None:
     end = final_state(ocp, lambda t: 6.0 - 12.0 * t, 1.0)
     np.testing.assert_allclose(end, [1.0, 0.0], atol=1e-5)
     assert quad(lambda t: (6.0 - 12.0 * t) ** 2 / 2, 0.0, 1.0)[0] == pytest.approx(6.0)
-    control = derive(ocp).control([0.0, 0.0], [-12.0, -6.0], 0.0, [])
+    control = minimum_principle(ocp).control([0.0, 0.0], [-12.0, -6.0], 0.0, [])
     assert float(control) == pytest.approx(6.0)
 
 
@@ -80,7 +80,7 @@ def test_reference_optimum_from_a_boundary_value_problem(
     build: Callable[[], OCP], reference: float
 ) -> None:
     ocp = build()
-    optimality, nx = derive(ocp), ocp.model.nx
+    optimality, nx = minimum_principle(ocp), ocp.model.nx
     duration, x0 = ocp.duration, np.asarray(ocp.x0)
 
     def flow(t: np.ndarray, z: np.ndarray) -> np.ndarray:

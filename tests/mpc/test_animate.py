@@ -8,8 +8,8 @@ import pytest
 from PIL import Image, ImageSequence
 
 from models import PlanarArm, line, redundancy_ocp
-from ocp import MPC, Applied, Box, Law, Plant, ProblemError, Rollout, closed_loop
-from ocp.mpc.animate_rollout import _controls_ahead, _sends_controls, _states_ahead
+from ocp import MPC, Box, FeedbackLaw, Plant, PlantInput, ProblemError, Rollout, closed_loop
+from ocp.plotting.animation import _controls_ahead, _sends_controls, _states_ahead
 from solvers import IndirectShooting, MultipleShooting
 from tests.mpc.problems import cart
 
@@ -46,7 +46,7 @@ def test_a_film_has_the_frames_that_were_asked_for(rollout: Rollout, tmp_path: P
 def test_a_loaded_rollout_and_a_law_have_no_plans(rollout: Rollout, tmp_path: Path) -> None:
     loaded = Rollout.load(rollout.save(tmp_path / "loop"), rollout.plant)
     law = closed_loop(
-        Law(law=lambda x, t: [-x[0]]), Plant(ocp=cart()), [1.0, 0.0], 2 * DT, dt=DT
+        FeedbackLaw(law=lambda x, t: [-x[0]]), Plant(ocp=cart()), [1.0, 0.0], 2 * DT, dt=DT
     )  # fmt: skip
     for k, made in enumerate((loaded, law)):
         file = made.animate(tmp_path / f"{k}.gif", frames_per_second=1)
@@ -77,7 +77,9 @@ def test_planned_inputs_are_shown_where_controls_are_sent(rollout: Rollout) -> N
         redundancy_ocp(arm, path, theta0=start, horizon=0.3, form=form)
         for form in ("null-space", "velocity")
     )
-    mpc = MPC(ocp=ocp, solver=MultipleShooting(5), dt=DT, applied=Applied("rate"), compiled=False)
+    mpc = MPC(
+        ocp=ocp, solver=MultipleShooting(5), dt=DT, applied=PlantInput("rate"), compiled=False
+    )
     assert not _sends_controls(mpc.run(Plant(ocp=plant), start, 0.2))
 
 
@@ -102,7 +104,7 @@ def test_what_cannot_be_filmed_is_said(rollout: Rollout, tmp_path: Path, options
 
 def test_a_loop_without_a_step_is_no_film(tmp_path: Path) -> None:
     refused = closed_loop(
-        Law(law=lambda x, t: [np.nan]), Plant(ocp=cart()), [1.0, 0.0], DT, dt=DT
+        FeedbackLaw(law=lambda x, t: [np.nan]), Plant(ocp=cart()), [1.0, 0.0], DT, dt=DT
     )  # fmt: skip
     with pytest.raises(ProblemError, match="no step; it ended: t = 0 s"):
         refused.animate(tmp_path / "film.gif")

@@ -10,7 +10,7 @@ from benchmarks.mpc.endings import ENDINGS, ending
 from benchmarks.mpc.late import delayed_loops
 from benchmarks.mpc.loop_row import LoopRow, found, read_loops
 from benchmarks.mpc.mass_loop import receding
-from ocp import Outcome, Rollout, Status
+from ocp import InputSource, Rollout, Status
 
 NAME = "arm-001"
 
@@ -61,7 +61,7 @@ def test_rows_are_written_and_compared(tmp_path) -> None:
 
 def test_the_mass_stays_behind_its_bound() -> None:
     rollout = receding(20, bounded=True).or_raise()
-    assert set(rollout.outcomes) == {Outcome.OPTIMAL}
+    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
     assert rollout.violation < 1e-6
 
 

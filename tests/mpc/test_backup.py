@@ -7,14 +7,15 @@ from hypothesis import strategies as st
 
 from benchmarks.cases import arm_scenario
 from benchmarks.mpc.altered import Altered
-from models import double_integrator_minimum_time, lq_regulator, mass_spring_damper, van_der_pol
+from models import lq_regulator, mass_spring_damper
+from models.textbook import double_integrator_minimum_time, van_der_pol
 from ocp import (
     MPC,
     OCP,
-    Applied,
     Box,
-    Outcome,
+    InputSource,
     Plant,
+    PlantInput,
     ProblemError,
     Solution,
     UnsupportedProblem,
@@ -99,7 +100,7 @@ def test_a_controller_whose_solver_always_fails_still_passes_the_obstacle():
         return mpc.run(Plant(ocp=ocp), ocp.start(), ocp.duration)
 
     rollout = closed(instantaneous(ocp))
-    assert set(rollout.outcomes) == {Outcome.BACKUP}
+    assert set(rollout.outcomes) == {InputSource.BACKUP}
     still = closed(lambda x, t: np.zeros(3))
     assert rollout.cost < still.cost
 
@@ -115,7 +116,7 @@ def test_the_rate_is_what_the_control_makes_of_the_state():
     rate = instantaneous(ocp, sent="rate")(x, 0.0)
     u = instantaneous(ocp)(x, 0.0)
     np.testing.assert_allclose(rate, np.array(ocp.functions.rate(x, u, 0.0, [])).ravel())
-    assert Applied("rate").size(ocp) == len(np.atleast_1d(rate))
+    assert PlantInput("rate").size(ocp) == len(np.atleast_1d(rate))
     with pytest.raises(ProblemError, match="neither"):
         instantaneous(ocp, sent="torque")  # pyright: ignore[reportArgumentType]
 

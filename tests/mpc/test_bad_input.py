@@ -11,15 +11,15 @@ import pytest
 from models import sinusoid, stable_plant, thesis_regulator, thesis_tracking
 from ocp import (
     MPC,
-    Applied,
     Constraint,
     ControlRefused,
     Decision,
+    FeedbackLaw,
     FlightRecorder,
     FreeTime,
-    Law,
-    Outcome,
+    InputSource,
     Plant,
+    PlantInput,
     ProblemError,
     Rollout,
     Signal,
@@ -61,12 +61,12 @@ def test_a_reference_that_ends_leaves_the_last_plan_and_then_the_backup_law(tmp_
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(mass(), np.zeros(2), 1.5, watch=recorder.watch)
     # The last whole preview starts at 0.5 s; its plan lasts for 9 more steps.
-    assert set(rollout.outcomes[:11]) == {Outcome.OPTIMAL}
-    assert set(rollout.outcomes[11:20]) == {Outcome.SHIFTED}
-    assert set(rollout.outcomes[20:]) == {Outcome.BACKUP}
+    assert set(rollout.outcomes[:11]) == {InputSource.OPTIMAL}
+    assert set(rollout.outcomes[11:20]) == {InputSource.SHIFTED}
+    assert set(rollout.outcomes[20:]) == {InputSource.BACKUP}
     assert "no parameters from t = 0.55 s on" in rollout.messages[11]
     assert "'reference' has 10 samples" in rollout.messages[11]
-    assert not rollout.decisions[11].is_informed
+    assert not rollout.decisions[11].parameters_known
     assert not rollout.decisions[11].parameters
     np.testing.assert_allclose(rollout.inputs[11:20], plan_of(rollout.decisions[10]).u[1:])
     assert len(list(records(tmp_path / "flight"))) == 30
@@ -94,13 +94,13 @@ def test_an_earlier_plan_is_judged_by_the_parameters_it_was_made_with() -> None:
 
     mpc = MPC(ocp=walled, solver=MultipleShooting(10), dt=0.1, parameters=by_radio)
     first = mpc.step(START, 0.0)
-    assert first.outcome is Outcome.OPTIMAL
+    assert first.outcome is InputSource.OPTIMAL
     told["on"] = False
     second = mpc.step(plan_of(first).x[1], 0.1)
-    assert second.outcome is Outcome.SHIFTED
+    assert second.outcome is InputSource.SHIFTED
     assert "the radio is off" in second.message
     told["on"] = True
-    assert mpc.step(plan_of(first).x[2], 0.2).outcome is Outcome.OPTIMAL
+    assert mpc.step(plan_of(first).x[2], 0.2).outcome is InputSource.OPTIMAL
 
 
 @pytest.mark.parametrize(
@@ -147,13 +147,13 @@ def test_without_plan_and_measurement_the_backup_law_is_told_so() -> None:
     seen: list[np.ndarray] = []
     mpc = replace(tracking(1.0), backup=lambda x, t: (seen.append(x), [0.5])[1])
     decision = mpc.step([np.nan, 0.0], 0.0)
-    assert decision.outcome is Outcome.BACKUP
+    assert decision.outcome is InputSource.BACKUP
     assert np.isnan(seen[0][0]), "no state is made up"
 
 
 @pytest.mark.parametrize("law", [broken, lambda x, t: [np.inf], lambda x, t: None])
 def test_nonsense_of_a_law_ends_the_loop_by_name(law) -> None:
-    rollout = closed_loop(Law(law=law), Plant(ocp=cart()), START, 1.0, dt=0.1)
+    rollout = closed_loop(FeedbackLaw(law=law), Plant(ocp=cart()), START, 1.0, dt=0.1)
     assert rollout.ended.startswith("t = 0 s: ")
     assert "the law" in rollout.ended
     assert len(rollout.inputs) == 0
@@ -161,7 +161,7 @@ def test_nonsense_of_a_law_ends_the_loop_by_name(law) -> None:
 
 def test_a_plan_fed_forward_is_followed_to_its_end_and_held() -> None:
     plan = LinearMPC().build(thesis_tracking(STEPS, dt=DT)).run()
-    rollout = closed_loop(Law.following(plan), mass(), plan.x0, 2 * STEPS * DT, dt=DT)
+    rollout = closed_loop(FeedbackLaw.following(plan), mass(), plan.x0, 2 * STEPS * DT, dt=DT)
     np.testing.assert_array_equal(rollout.inputs[:STEPS], plan.u)
     np.testing.assert_array_equal(rollout.inputs[STEPS:], np.tile(plan.u[-1], (STEPS, 1)))
     np.testing.assert_allclose(rollout.x[: STEPS + 1], plan.x, atol=1e-9)
@@ -189,7 +189,7 @@ def test_what_is_of_a_wrong_kind_is_named(name) -> None:
 
 
 def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
-    rate = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1, applied=Applied("rate"))
+    rate = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1, applied=PlantInput("rate"))
     with pytest.raises(ProblemError, match=r"2 inputs, but the plant 'cart' has 1"):
         rate.run(Plant(ocp=cart()), START, 0.5)
     plant = Plant(ocp=thesis_regulator(stable_plant(), 5))
@@ -210,14 +210,14 @@ def test_a_plant_of_another_size_is_refused_before_the_start() -> None:
     ],
 )
 def test_a_function_of_the_plant_that_does_not_fit(plant, message) -> None:
-    law = Law(law=lambda x, t: [0.0])
+    law = FeedbackLaw(law=lambda x, t: [0.0])
     with pytest.raises(ProblemError, match=message):
         closed_loop(law, replace(mass(), **plant), np.zeros(2), 1.0, dt=DT)
 
 
 def test_a_problem_is_no_plant() -> None:
     with pytest.raises(ProblemError, match="closed loop: plant is an OCP, Plant is needed"):
-        closed_loop(Law(law=lambda x, t: [0.0]), cart(), START, 1.0, dt=DT)  # type: ignore[arg-type]
+        closed_loop(FeedbackLaw(law=lambda x, t: [0.0]), cart(), START, 1.0, dt=DT)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -231,11 +231,11 @@ def test_a_problem_is_no_plant() -> None:
 )
 def test_a_loop_that_is_none(options, message) -> None:
     with pytest.raises(ProblemError, match=message):
-        closed_loop(Law(law=lambda x, t: [0.0]), Plant(ocp=cart()), START, 1.0, **options)
+        closed_loop(FeedbackLaw(law=lambda x, t: [0.0]), Plant(ocp=cart()), START, 1.0, **options)
 
 
 def test_a_rollout_that_was_cut_off_or_changed(tmp_path: Path) -> None:
-    law = Law(law=lambda x, t: [0.0])
+    law = FeedbackLaw(law=lambda x, t: [0.0])
     file = closed_loop(law, mass(), np.zeros(2), 0.5, dt=DT).save(tmp_path / "loop")
     whole = file.read_bytes()
     (tmp_path / "short.npz").write_bytes(whole[: len(whole) // 2])

@@ -11,19 +11,20 @@ import pytest
 
 from benchmarks.cases import arm_scenario
 from benchmarks.mpc.faults import SUBJECTS, campaign
-from models import cart_pole_upright, double_integrator_minimum_time, van_der_pol
+from models import cart_pole_upright
+from models.textbook import double_integrator_minimum_time, van_der_pol
 from ocp import (
     MPC,
     OCP,
-    Applied,
     Box,
     Constraint,
     ControlRefused,
     FlightRecorder,
+    InputSource,
     Model,
-    Outcome,
     Parameter,
     Plant,
+    PlantInput,
     ProblemError,
     Signal,
     Solution,
@@ -33,7 +34,7 @@ from ocp import (
     replay_all,
     saturated_lqr,
 )
-from ocp.mpc.fallback import Backup, backup_of, is_redundant
+from ocp.mpc.backup_selection import Backup, is_redundant, select_backup
 from solvers import MultipleShooting
 from tests.mpc.problems import LIMIT, cart, scripted
 
@@ -42,7 +43,7 @@ REGULATOR, KINEMATICS = "saturated regulator", "instantaneous control"
 
 
 def law_of(ocp: OCP, dt: float = DT) -> Backup:
-    return backup_of("default", ocp, dt, Applied())
+    return select_backup("default", ocp, dt, PlantInput())
 
 
 def fails(solution: Solution) -> Solution:
@@ -127,7 +128,7 @@ def test_the_law_in_force_is_seen():
     assert f"backup_law=Backup({REGULATOR})" in repr(mpc)
     x = np.array([0.5, 0.0])
     decision = mpc.step(x, 0.0)
-    assert decision.outcome is Outcome.BACKUP
+    assert decision.outcome is InputSource.BACKUP
     assert decision.message.endswith(f"backup: {REGULATOR}")
     np.testing.assert_allclose(decision.input, saturated_lqr(cart(), dt=DT)(x, 0.0))
     own = always_failing(cart(), backup=lambda x, t: [0.5])
@@ -165,7 +166,7 @@ def test_without_a_state_the_suggested_law_holds():
 
 def test_the_suggested_regulator_brings_the_cart_home():
     rollout = always_failing(cart()).run(Plant(ocp=cart()), [0.5, 0.0], 6.0)
-    assert set(rollout.outcomes) == {Outcome.BACKUP}
+    assert set(rollout.outcomes) == {InputSource.BACKUP}
     assert np.abs(rollout.x[-1]).max() < 1e-2
     assert np.abs(rollout.inputs).max() <= LIMIT
 
@@ -173,7 +174,7 @@ def test_the_suggested_regulator_brings_the_cart_home():
 def test_the_suggested_kinematics_send_what_the_plant_receives():
     ocp = arm_scenario("arm-001").ocp("sum")
     x = ocp.start()
-    for applied in (Applied(), Applied("rate", Box(-9.0, 9.0))):
+    for applied in (PlantInput(), PlantInput("rate", Box(-9.0, 9.0))):
         decision = always_failing(ocp, applied=applied).step(x, 0.0)
         expected = instantaneous(ocp, sent=applied.what)(x, 0.0)
         np.testing.assert_array_equal(decision.input, expected)
@@ -198,7 +199,7 @@ def test_steps_of_a_suggested_law_replay_to_the_last_bit(tmp_path: Path):
     plant = Plant(ocp=cart(mass=1.2), measurement_noise=0.01)
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(plant, [1.0, 0.0], 3.0, watch=recorder.watch).or_raise()
-    assert rollout.counts[Outcome.BACKUP] > 10
+    assert rollout.counts[InputSource.BACKUP] > 10
     steps = range(len(rollout.outcomes))
     assert all(step.is_exact for step in replay_all(mpc, tmp_path / "flight", steps))
 
@@ -215,4 +216,4 @@ def test_no_fault_gets_through_with_the_suggested_laws(subject, steps, monkeypat
     monkeypatch.setitem(SUBJECTS, subject, suggested)
     report = reduce(add, campaign(subject, steps, seed=1))
     assert report.is_clean, report
-    assert any(outcome is Outcome.BACKUP for _, outcome in report.outcomes), "it was needed"
+    assert any(outcome is InputSource.BACKUP for _, outcome in report.outcomes), "it was needed"

@@ -10,13 +10,13 @@ import pytest
 from models import PlanarArm, line, redundancy_ocp
 from ocp import (
     MPC,
-    Applied,
     Box,
     ControlRefused,
+    FeedbackLaw,
     FlightRecorder,
-    Law,
-    Outcome,
+    InputSource,
     Plant,
+    PlantInput,
     ProblemError,
     Rollout,
     Solution,
@@ -82,7 +82,7 @@ def test_continuous_solvers_run_in_the_loop(solver) -> None:
 def test_linear_solvers_run_in_the_loop(solver) -> None:
     ocp = discretise(unconstrained(), dt=0.05)
     rollout = MPC(ocp=ocp, solver=solver, dt=0.05).run(Plant(ocp=ocp), START, 1.0).or_raise()
-    assert set(rollout.outcomes) == {Outcome.OPTIMAL}
+    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
     other = MPC(ocp=ocp, solver=LinearMPC(), dt=0.05).run(Plant(ocp=ocp), START, 1.0)
     np.testing.assert_allclose(rollout.inputs, other.inputs, atol=1e-6)
 
@@ -93,12 +93,12 @@ def unconstrained():
 
 def test_a_plain_law_in_the_same_loop() -> None:
     ocp = cart()
-    law = Law(law=lambda x, t: [-5.0 * x[0] - 3.0 * x[1]], bounds=ocp.control_bounds)
+    law = FeedbackLaw(law=lambda x, t: [-5.0 * x[0] - 3.0 * x[1]], bounds=ocp.control_bounds)
     rollout = closed_loop(law, Plant(ocp=ocp), START, 5.0, dt=DT).or_raise()
-    assert set(rollout.outcomes) == {Outcome.FEASIBLE}
+    assert set(rollout.outcomes) == {InputSource.FEASIBLE}
     assert np.abs(rollout.x[-1]).max() < 0.05
     assert rollout.clipped[0] == pytest.approx(3.0)
-    wrong = closed_loop(Law(law=lambda x, t: [np.nan]), Plant(ocp=ocp), START, 1.0, dt=DT)
+    wrong = closed_loop(FeedbackLaw(law=lambda x, t: [np.nan]), Plant(ocp=ocp), START, 1.0, dt=DT)
     with pytest.raises(SolverError, match=r"ended at t = 0 s.*the law returned"):
         wrong.or_raise()
 
@@ -111,7 +111,7 @@ def test_a_robot_takes_joint_velocities() -> None:
         ocp=redundancy_ocp(arm, path, theta0=start, horizon=0.3, form="velocity"),
         measurement_noise=1e-3,
     )
-    applied = Applied("rate", Box(-5.0, 5.0))
+    applied = PlantInput("rate", Box(-5.0, 5.0))
     mpc = MPC(ocp=ocp, solver=MultipleShooting(15), dt=0.02, applied=applied)
     rollout = mpc.run(plant, start, 1.0, seed=3).or_raise()
     assert rollout.drift < 5e-3, "with the correction noise leaves no offset"
@@ -157,7 +157,7 @@ def test_the_cost_is_that_of_the_plants_own_trajectory() -> None:
     """One plan followed to its end: the loop's cost is the referee's of that plan."""
     ocp = cart()
     plan = solve(ocp, MultipleShooting(10))
-    law = Law(law=lambda x, t: plan.control(t + 1e-9))
+    law = FeedbackLaw(law=lambda x, t: plan.control(t + 1e-9))
     rollout = closed_loop(law, Plant(ocp=ocp, substeps=20), START, 1.0, dt=DT)
     end = float(ocp.functions.terminal_cost(rollout.x[-1], 1.0, []))
     assert rollout.cost + end == pytest.approx(plan.cost, rel=1e-5)
@@ -184,7 +184,7 @@ def test_compensation_takes_the_loss_of_a_delay_away() -> None:
 def test_without_a_head_start_the_initial_input_acts_and_is_reckoned_with() -> None:
     """What acts in the meantime is part of the prediction, from the first step on."""
     seen = []
-    law = Law(law=lambda x, t: [0.0], delay=2 * DT)
+    law = FeedbackLaw(law=lambda x, t: [0.0], delay=2 * DT)
     pushed = closed_loop(law, Plant(ocp=cart()), START, 2 * DT, dt=DT, initial_input=[1.5])
     mpc = driver(delay=2 * DT)
     loop = closed_loop(
@@ -203,20 +203,20 @@ def test_a_head_start_asks_before_the_plant_moves() -> None:
         return [0.5]
 
     loop = closed_loop(
-        Law(law=law, delay=2 * DT), Plant(ocp=cart()), START, 3 * DT, dt=DT, head_start=True
+        FeedbackLaw(law=law, delay=2 * DT), Plant(ocp=cart()), START, 3 * DT, dt=DT, head_start=True
     )
     np.testing.assert_allclose([t for t, _ in asked], DT * np.arange(-2, 3), atol=1e-12)
     for _, x in asked[:3]:
         np.testing.assert_array_equal(x, START)
     np.testing.assert_array_equal(loop.inputs, 0.5)
     assert len(loop.decisions) == 3
-    assert [loop.acting(k) for k in range(3)] == [None, None, Outcome.FEASIBLE]
+    assert [loop.acting(k) for k in range(3)] == [None, None, InputSource.FEASIBLE]
 
     def refuses(x: np.ndarray, t: float) -> list[float]:
         return [np.nan]
 
     ended = closed_loop(
-        Law(law=refuses, delay=DT), Plant(ocp=cart()), START, DT, dt=DT, head_start=True
+        FeedbackLaw(law=refuses, delay=DT), Plant(ocp=cart()), START, DT, dt=DT, head_start=True
     )
     assert len(ended.inputs) == 0
     assert "the law returned" in ended.ended
@@ -293,7 +293,7 @@ def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: floa
         rollout = mpc.run(plant, START, 0.8, watch=recorder.watch)
     found = list(records(file))
     assert [record.outcome for record in found] == list(rollout.outcomes)
-    assert rollout.outcomes.count(Outcome.SHIFTED) == 2
+    assert rollout.outcomes.count(InputSource.SHIFTED) == 2
     assert all(replay(mpc, file, k).is_exact for k in range(len(found)))
     with pytest.raises(ProblemError, match="has no step 8"):
         replay(mpc, file, 8)
@@ -315,7 +315,7 @@ def test_a_refusal_is_recorded_and_refused_again(tmp_path: Path) -> None:
     assert (first.outcome, first.input, first.status) == (None, None, Status.SOLVED)
     assert "too late for its step; there is no earlier plan" in first.message
     assert first.plan is not None
-    assert (second.outcome, third.outcome) == (Outcome.SHIFTED, Outcome.SHIFTED)
+    assert (second.outcome, third.outcome) == (InputSource.SHIFTED, InputSource.SHIFTED)
     assert [step.is_exact for step in replay_all(mpc, file, range(3))] == [True] * 3
 
 
@@ -334,7 +334,7 @@ def test_a_loop_records_the_refusal_that_ends_it(tmp_path: Path) -> None:
         rollout = mpc.run(jumps, START, 1.0, watch=recorder.watch)
     assert "FAILED" in rollout.ended
     found = list(records(tmp_path / "flight"))
-    assert [r.outcome for r in found] == [Outcome.OPTIMAL] * 3 + [None]
+    assert [r.outcome for r in found] == [InputSource.OPTIMAL] * 3 + [None]
     assert found[3].message in rollout.ended
     assert all(step.is_exact for step in replay_all(mpc, tmp_path / "flight", range(4)))
     # Whoever has a backup law now does not refuse: that is no exact replay.
@@ -353,7 +353,7 @@ def test_a_law_that_refuses_is_no_flight(tmp_path: Path) -> None:
 def test_a_solver_that_remembers_replays_from_the_start(tmp_path: Path) -> None:
     ocp = discretise(cart_without_path(), dt=0.05)
     mpc = MPC(ocp=ocp, solver=LinearMPC(), dt=0.05)
-    assert mpc.remembers
+    assert mpc.is_stateful
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         mpc.run(Plant(ocp=ocp, measurement_noise=0.01), START, 1.0, watch=recorder.watch)
     assert replay(mpc, tmp_path / "flight", 17).is_exact
@@ -384,7 +384,7 @@ def test_what_does_not_fit_is_said() -> None:
         driver().run(Plant(ocp=cart()), START, 0.55)
     with pytest.raises(ProblemError, match="plant: x0 has 3 entries"):
         driver().run(Plant(ocp=cart()), [1.0, 0.0, 0.0], 0.5)
-    two = Law(law=lambda x, t: [0.0, 0.0])
+    two = FeedbackLaw(law=lambda x, t: [0.0, 0.0])
     with pytest.raises(ProblemError, match="sends 2 inputs, the plant 'cart' takes 1"):
         closed_loop(two, Plant(ocp=cart()), START, 0.5, dt=DT)
     bad_plants: tuple[dict[str, Any], ...] = (

@@ -3,16 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from ocp import (
-    OCP,
-    Box,
-    Constraint,
-    Model,
-    Parameter,
-    Signal,
-    Solution,
-    Status,
-)
+from ocp import OCP, Box, Constraint, Model, Parameter, Signal, Solution, Status
 
 DURATION = 1.5
 

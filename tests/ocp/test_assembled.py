@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import van_der_pol
-from ocp import OCP, RK4, Euler, Integrator, Midpoint, Stage, assembled, c_code
+from models.textbook import van_der_pol
+from ocp import OCP, RK4, Euler, Integrator, Midpoint
+from ocp.internal import Stage, c_code, differentiable_step
 from tests.linear_dp.problems import unstable_mass
 from tests.ocp.differences import jacobian
 from tests.solvers.problems import changed, quartic, timed_transfer, tracker
@@ -48,7 +49,7 @@ def numbers(function: ca.Function, ocp: OCP) -> list[ca.DM]:
 @pytest.mark.parametrize("make", PROBLEMS)
 def test_what_casadi_asks_for_is_that_of_the_stage(make, integrator):
     ocp = make()
-    one, other = assembled(ocp, integrator), written_out(ocp, integrator)
+    one, other = differentiable_step(ocp, integrator), written_out(ocp, integrator)
     pairs = [(one, other), (one.jacobian(), other.jacobian()), (one.reverse(1), other.reverse(1))]
     pairs += [(one.reverse(1).jacobian(), other.reverse(1).jacobian())]
     for ours, theirs in pairs:
@@ -65,7 +66,7 @@ def test_what_casadi_asks_for_is_that_of_the_stage(make, integrator):
 def test_derivatives_along_everything_unknown_are_those_of_finite_differences():
     """Along t and h as well: the final time is free, and everything depends on t."""
     ocp = timed_tracker()
-    step = assembled(ocp, RK4(2))
+    step = differentiable_step(ocp, RK4(2))
     given, costate, price = numbers(step, ocp), ca.DM([0.7, -1.3]), ca.DM(0.4)
     w = np.concatenate([np.array(part).ravel() for part in given[:4]])
 
@@ -95,7 +96,7 @@ def test_derivatives_along_everything_unknown_are_those_of_finite_differences():
 
 def test_a_row_of_stages_is_differentiated_by_the_same_functions():
     ocp = arm()
-    row = [make(ocp, RK4()).map(3) for make in (assembled, written_out)]
+    row = [make(ocp, RK4()).map(3) for make in (differentiable_step, written_out)]
     hessians = [function.reverse(1).jacobian() for function in row]
     given = numbers(hessians[0], ocp)
     for ours, theirs in zip(*(hessian.call(given) for hessian in hessians), strict=True):
@@ -105,7 +106,9 @@ def test_a_row_of_stages_is_differentiated_by_the_same_functions():
 
 def test_three_substeps_take_less_code_than_one_written_out():
     ocp = arm()
-    once, thrice = (len(c_code(assembled(ocp, RK4(steps)), along(ocp))) for steps in (1, 3))
+    once, thrice = (
+        len(c_code(differentiable_step(ocp, RK4(steps)), along(ocp))) for steps in (1, 3)
+    )
     out = len(c_code(written_out(ocp, RK4()), along(ocp)))
     assert once < out / 3
     assert thrice < 2 * out / 3

@@ -10,15 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ocp import (
-    RK4,
-    Buffered,
-    Compiler,
-    InterpretedWarning,
-    ProblemError,
-    Stage,
-    compiled,
-)
+from ocp import RK4, Compiler, InterpretedWarning, ProblemError
+from ocp.internal import BufferedFunction, Stage, compiled
 from tests.mpc.problems import cart
 
 # Machine code may contract a multiplication and an addition to one rounding.
@@ -110,7 +103,7 @@ def test_what_was_built_once_is_loaded(tmp_path, monkeypatch):
     def forbidden(*_args: object) -> None:
         raise AssertionError("it is built again")
 
-    monkeypatch.setattr("ocp.compile._build", forbidden)
+    monkeypatch.setattr("ocp.codegen.compile._build", forbidden)
     again = compiled(pendulum(), compiler=compiler)
     assert again.is_a("External")
     assert_same(pendulum(), again, 0)
@@ -232,13 +225,15 @@ def test_a_buffered_function_is_the_function(n, columns, seed):
     function = ca.Function("f", [x, p], [sparse, ca.sumsqr(x), p]).map(columns)
     given = np.random.default_rng(seed).normal(size=(n, columns))
     empty = np.empty((0, columns))
-    for one, other in zip(Buffered(function)(given, empty), function(given, empty), strict=True):
+    for one, other in zip(
+        BufferedFunction(function)(given, empty), function(given, empty), strict=True
+    ):
         np.testing.assert_array_equal(one, np.array(other).reshape(one.shape))
 
 
 def test_a_buffered_function_is_evaluated_in_its_own_memory():
     """Also when nobody keeps anything but the method and the memory."""
-    buffered = Buffered(pendulum())
+    buffered = BufferedFunction(pendulum())
     (x, u, t), (found, *_) = buffered.inputs, buffered.outputs
     evaluate = buffered.evaluate
     del buffered
@@ -250,7 +245,7 @@ def test_a_buffered_function_is_evaluated_in_its_own_memory():
 
 
 def test_what_a_buffered_function_returned_stays_as_it_was():
-    buffered = Buffered(pendulum())
+    buffered = BufferedFunction(pendulum())
     first = buffered([1.0, 2.0], 0.5, 0.0)
     kept = [array.copy() for array in first]
     buffered([3.0, -2.0], 0.1, 1.0)
@@ -261,4 +256,4 @@ def test_what_a_buffered_function_returned_stays_as_it_was():
 @pytest.mark.parametrize("x", [[1.0], [[1.0, 2.0]], [1.0, 2.0, 3.0], 1.0])
 def test_a_buffered_function_refuses_other_shapes(x):
     with pytest.raises(ValueError, match=r"\(2, 1\) is needed"):
-        Buffered(pendulum())(x, 0.0, 0.0)
+        BufferedFunction(pendulum())(x, 0.0, 0.0)

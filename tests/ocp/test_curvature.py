@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import van_der_pol
-from ocp import OCP, RK4, Euler, Integrator, Midpoint, Stage, curvature
+from models.textbook import van_der_pol
+from ocp import OCP, RK4, Euler, Integrator, Midpoint
+from ocp.internal import Stage, stage_hessian
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import quartic, tracker
 
@@ -33,7 +34,7 @@ def arm() -> OCP:
 @pytest.mark.parametrize("make", [tracker, van_der_pol, quartic, arm, unstable_mass])
 def test_every_output_is_that_of_the_stage(make, integrator):
     ocp = make()
-    one, other = curvature(ocp, integrator), written_out(ocp, integrator)
+    one, other = stage_hessian(ocp, integrator), written_out(ocp, integrator)
     assert one.size_in("x") == other.size_in(0)
     rng = np.random.default_rng(0)
     numbers = [rng.uniform(0.1, 0.9, size=one.size_in(i)) for i in range(one.n_in())]

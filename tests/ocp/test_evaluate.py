@@ -20,19 +20,12 @@ from ocp import (
     costates_along,
     evaluate,
 )
-from ocp.referee.march import March
-from ocp.referee.truth import follow
+from ocp.referee.chunked_rollout import ChunkedRollout
+from ocp.referee.reference_trajectory import integrate_controls
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, lag, pendulum, trajectory
-from tests.tolerances import (
-    DERIVATIVE,
-    MINIMISER,
-    NOT_STATIONARY,
-    REFEREE,
-    ROUNDING,
-    STATIONARY,
-)
+from tests.tolerances import DERIVATIVE, MINIMISER, NOT_STATIONARY, REFEREE, ROUNDING, STATIONARY
 
 U_HELD = np.array([[0.5, -1.0], [2.0, 0.3], [-1.5, 0.1], [0.2, 0.9]])
 U_LINEAR = np.vstack([U_HELD, [[-0.4, 0.6]]])
@@ -94,7 +87,10 @@ def test_cost_agrees_with_cvodes(kind: str, u: np.ndarray, t0: float) -> None:
 
 def test_refines_until_the_cost_holds_still() -> None:
     solution = trajectory(pendulum(), 20 * U_HELD)
-    coarse, fine = follow(solution, tolerance=1e-3), follow(solution, tolerance=1e-12)
+    coarse, fine = (
+        integrate_controls(solution, tolerance=1e-3),
+        integrate_controls(solution, tolerance=1e-12),
+    )
     assert fine.substeps > coarse.substeps
     assert fine.cost_error <= 1e-12 * (1 + abs(fine.cost))
     assert coarse.cost == pytest.approx(fine.cost, rel=1e-3)
@@ -154,7 +150,7 @@ def test_a_free_start_is_the_solutions_own() -> None:
 
 def test_a_march_is_a_loop_of_any_length() -> None:
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    step = March(ca.Function("step", [x, u], [0.9 * x + u, x * u]))
+    step = ChunkedRollout(ca.Function("step", [x, u], [0.9 * x + u, x * u]))
     for k in (1, 2, 127, 128, 129, 300):
         drive, state, expected = np.sin(np.arange(k))[:, None], 1.0, []
         for d in drive[:, 0]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ocp import RK4, Euler, Integrator, Midpoint, ProblemError, Stage
+from ocp import RK4, Euler, Integrator, Midpoint, ProblemError
+from ocp.internal import Stage
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, lag, pendulum
 from tests.tolerances import DERIVATIVE, ORDER, ROUNDING

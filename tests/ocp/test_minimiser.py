@@ -6,7 +6,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from ocp import OCP, Box, Model, Solution, Status, costates_along, derive, evaluate, hamiltonian
+from ocp import OCP, Box, Model, Solution, Status, costates_along, evaluate, minimum_principle
+from ocp.internal import hamiltonian
 from tests.ocp.differences import jacobian
 from tests.tolerances import DERIVATIVE, RESIDUAL
 
@@ -47,7 +48,7 @@ HEADING, DIRECTION = heading(), direction()
 @example((0.5002682, -0.33186, 0.0))  # next to an inflection of H, where Newton's step is huge
 def test_an_angle_is_that_of_the_minimum(costates: tuple[float, ...]) -> None:
     costate = np.array(costates[:2])
-    angle = float(derive(HEADING).control(np.zeros(2), costate, 0.0, []))
+    angle = float(minimum_principle(HEADING).control(np.zeros(2), costate, 0.0, []))
     assert np.cos(angle) == pytest.approx(-costate[0] / np.hypot(*costate), abs=1e-9)
     assert np.sin(angle) == pytest.approx(-costate[1] / np.hypot(*costate), abs=1e-9)
 
@@ -57,7 +58,7 @@ def test_an_angle_is_that_of_the_minimum(costates: tuple[float, ...]) -> None:
 @example((1.0, 0.0, 8.795651310845108e-147))  # H_uu has entries whose squares underflow
 def test_two_angles_minimise_locally(costates: tuple[float, ...]) -> None:
     h, x, costate = hamiltonian(DIRECTION), np.zeros(3), np.array(costates)
-    u = np.array(derive(DIRECTION).control(x, costate, 0.0, [])).ravel()
+    u = np.array(minimum_principle(DIRECTION).control(x, costate, 0.0, [])).ravel()
     assert np.abs(np.array(h.control_gradient(x, u, costate, 0.0, []))).max() < RESIDUAL
     assert np.linalg.eigvalsh(np.array(h.control_curvature(x, u, costate, 0.0, [])))[0] > -1e-9
 
@@ -67,7 +68,7 @@ def test_two_angles_minimise_locally(costates: tuple[float, ...]) -> None:
 def test_a_bounded_angle_meets_the_conditions_of_a_minimum(costates: tuple[float, ...]) -> None:
     box, x, costate = Box(-0.5, 1.5), np.zeros(2), np.array(costates[:2])
     ocp = BOUNDED
-    u = np.array(derive(ocp).control(x, costate, 0.0, [])).ravel()
+    u = np.array(minimum_principle(ocp).control(x, costate, 0.0, [])).ravel()
     slope = np.array(hamiltonian(ocp).control_gradient(x, u, costate, 0.0, [])).ravel()
     assert np.abs(u - box.sized(1, "box").clip(u - slope)).max() < RESIDUAL
 
@@ -76,7 +77,7 @@ BOUNDED = heading(Box(-0.5, 1.5))
 
 
 def test_the_law_is_differentiated_through_its_root() -> None:
-    law, x, costate = derive(HEADING).control, np.zeros(2), np.array([0.5, -1.2])
+    law, x, costate = minimum_principle(HEADING).control, np.zeros(2), np.array([0.5, -1.2])
     slope = np.array(law.jacobian()(x, costate, 0.0, [], law(x, costate, 0.0, []))[1], dtype=float)
     differences = jacobian(lambda c: np.array(law(x, c, 0.0, [])).ravel(), costate)
     assert slope == pytest.approx(differences, abs=DERIVATIVE)

@@ -10,12 +10,12 @@ from ocp import (
     Box,
     Constraint,
     FreeTime,
+    MinimumPrinciple,
     Model,
-    Optimality,
     UnsupportedProblem,
-    derive,
-    hamiltonian,
+    minimum_principle,
 )
+from ocp.internal import hamiltonian
 from tests.ocp.differences import gradient, jacobian
 from tests.ocp.problems import energy, integrator, lag, pendulum
 from tests.tolerances import DERIVATIVE, MINIMISER, ROUNDING
@@ -63,7 +63,7 @@ def test_derivatives() -> None:
 
 def test_flow_is_canonical() -> None:
     ocp = pendulum()
-    o = derive(ocp)
+    o = minimum_principle(ocp)
     u = np.array(o.control(X, COSTATE, T, P)).ravel()
     got = np.array(o.flow(np.append(X, COSTATE), T, P)).ravel()
     h_costate = gradient(lambda c: float(o.hamiltonian.value(X, u, c, T, P)), COSTATE)
@@ -122,7 +122,7 @@ CASES = {
 def test_control_minimises_the_hamiltonian(name: str) -> None:
     cost, box, form = CASES[name]
     ocp = two_controls(cost, box)
-    o = derive(ocp)
+    o = minimum_principle(ocp)
     assert o.control.is_a("SXFunction") is (form == "closed")
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -132,7 +132,7 @@ def test_control_minimises_the_hamiltonian(name: str) -> None:
         assert not ocp.control_bounds.excess(u).any()
 
 
-def brute_force(ocp: OCP, o: Optimality, x: np.ndarray, costate: np.ndarray) -> np.ndarray:
+def brute_force(ocp: OCP, o: MinimumPrinciple, x: np.ndarray, costate: np.ndarray) -> np.ndarray:
     """Minimise H within the bounds by a general optimiser (H is convex in these cases)."""
     box = ocp.control_bounds
     found = minimize(
@@ -147,7 +147,7 @@ def brute_force(ocp: OCP, o: Optimality, x: np.ndarray, costate: np.ndarray) -> 
 
 
 def test_an_implicit_law_has_the_derivative_of_the_implicit_function() -> None:
-    o = derive(two_controls(quartic))
+    o = minimum_principle(two_controls(quartic))
     x, costate = np.array([0.3, -0.7]), np.array([1.1, -0.4])
     inputs = [ca.MX.sym("x", 2), ca.MX.sym("costate", 2)]
     u = o.control(*inputs, 0.0, ca.DM(0, 1))
@@ -161,22 +161,22 @@ def test_an_implicit_law_has_the_derivative_of_the_implicit_function() -> None:
 
 def test_refuses_a_control_that_enters_linearly_and_names_it() -> None:
     with pytest.raises(UnsupportedProblem, match=r"linear in the control u_1: .*bang-bang"):
-        derive(two_controls(lambda x, u: u[0] ** 2 + u[1]))
+        minimum_principle(two_controls(lambda x, u: u[0] ** 2 + u[1]))
 
 
 def test_refuses_a_hamiltonian_that_does_not_determine_the_control() -> None:
     with pytest.raises(UnsupportedProblem, match="H_uu is singular"):
-        derive(two_controls(lambda x, u: (u[0] + u[1]) ** 2))
+        minimum_principle(two_controls(lambda x, u: (u[0] + u[1]) ** 2))
 
 
 def test_refuses_discrete_time() -> None:
     with pytest.raises(UnsupportedProblem, match=r"lag: .* continuous time"):
-        derive(lag())
+        minimum_principle(lag())
 
 
 def test_refuses_signals_that_stretch_with_the_final_time() -> None:
     with pytest.raises(UnsupportedProblem, match="signal 'held' stretches with the free final"):
-        derive(pendulum(horizon=FreeTime(guess=1.0)))
+        minimum_principle(pendulum(horizon=FreeTime(guess=1.0)))
 
 
 @pytest.mark.parametrize("at", ["terminal", "initial"])
@@ -191,7 +191,7 @@ def test_refuses_inequalities_at_the_ends(at) -> None:
         constraints=(Constraint("far", base.model.x, 1.0, 2.0, at=at),),
     )
     with pytest.raises(UnsupportedProblem, match=f"the {at} constraint 'far' is an inequality"):
-        derive(ocp)
+        minimum_principle(ocp)
 
 
 # -- the ends -------------------------------------------------------------------------
@@ -199,7 +199,7 @@ def test_refuses_inequalities_at_the_ends(at) -> None:
 
 def test_energy_optimum_meets_all_conditions() -> None:
     """Closed form in problems.energy: u = 6 - 12 t, costates (-12, 12 t - 6)."""
-    o = derive(energy())
+    o = minimum_principle(energy())
     for t in (0.0, 0.3, 1.0):
         x = np.array([3 * t**2 - 2 * t**3, 6 * t - 6 * t**2])
         costate = np.array([-12.0, 12 * t - 6])
@@ -217,14 +217,14 @@ def test_energy_optimum_meets_all_conditions() -> None:
 def test_a_free_end_has_the_gradient_of_the_terminal_cost() -> None:
     ocp = pendulum()
     phi_x = gradient(lambda x: float(ocp.functions.terminal_cost(x, T, P)), X)
-    residual = np.array(derive(ocp).end(X, phi_x, [], T, P)).ravel()
+    residual = np.array(minimum_principle(ocp).end(X, phi_x, [], T, P)).ravel()
     np.testing.assert_allclose(residual, 0.0, atol=DERIVATIVE)
 
 
 def test_a_costate_is_normal_to_the_manifold_of_the_start() -> None:
     base = pendulum()
     circle = Constraint("circle", ca.sumsqr(base.model.x), 1.0, 1.0, at="initial")
-    o = derive(
+    o = minimum_principle(
         OCP(
             name="circle",
             model=base.model,
@@ -247,7 +247,9 @@ def test_free_time_without_explicit_time() -> None:
     """min int 1 + u^2/2, x: 0 -> 1. H = 1 - l^2/2 = 0, so l = -sqrt(2), T = 1/sqrt(2)."""
     ocp = reach(running=1.0, terminal=0.0)
     lam = -np.sqrt(2.0)
-    residual = np.array(derive(ocp).end([1.0], [lam], [lam], 1 / np.sqrt(2.0), [])).ravel()
+    residual = np.array(
+        minimum_principle(ocp).end([1.0], [lam], [lam], 1 / np.sqrt(2.0), [])
+    ).ravel()
     np.testing.assert_allclose(residual, 0.0, atol=ROUNDING)
 
 
@@ -256,7 +258,7 @@ def test_free_time_with_a_cost_of_time() -> None:
     ocp = reach(running=0.0, terminal="T")
     duration = 2.0 ** (-1.0 / 3.0)
     lam = -1.0 / duration
-    residual = np.array(derive(ocp).end([1.0], [lam], [lam], duration, [])).ravel()
+    residual = np.array(minimum_principle(ocp).end([1.0], [lam], [lam], duration, [])).ravel()
     np.testing.assert_allclose(residual, 0.0, atol=ROUNDING)
 
 

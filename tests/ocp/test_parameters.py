@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ocp import Parameter, ParameterValues, ProblemError, Signal
+from ocp import Parameter, ProblemError, Signal
+from ocp.internal import ParameterValues
 from tests.ocp.problems import integrator, lag
 from tests.tolerances import ROUNDING
 

@@ -9,17 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ocp import (
-    Box,
-    Pieces,
-    ProblemError,
-    Solution,
-    bernstein,
-    costates_along,
-    elevated,
-    evaluate,
-)
-from ocp.mpc.shift import Shifted, controls
+from ocp import Box, ProblemError, Solution, costates_along, evaluate
+from ocp.closed_loop.shifted_plan import ShiftedPlan, plan_controls
+from ocp.internal import PiecewisePolynomial, bernstein, elevated
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, pendulum, trajectory
 from tests.tolerances import MINIMISER, REFEREE, ROUNDING, STATIONARY
@@ -72,7 +64,7 @@ def test_edges_belong_to_the_piece_that_begins() -> None:
         solution.control([-1.0, 0.0, 0.45, 0.6, DURATION, 9.0]), C[[0, 0, 3, 6, 8, 8]]
     )
     np.testing.assert_allclose(solution.control(0.225), C[:3].T @ [0.25, 0.5, 0.25])
-    np.testing.assert_array_equal(controls(solution, T), solution.control(T))
+    np.testing.assert_array_equal(plan_controls(solution, T), solution.control(T))
     left = solution.pieces.at(np.array([0.45]), np.array([0]))
     np.testing.assert_allclose(left, C[[2]])
 
@@ -147,7 +139,7 @@ def test_a_control_within_its_bounds_violates_nothing() -> None:
 
 def test_shifted_plan_keeps_its_controls() -> None:
     plan, fractions = curved(), np.linspace(0.0, 1.0, 9)
-    u = Shifted(plan, 0.3).sample("u", fractions, plan.problem.model.nu)
+    u = ShiftedPlan(plan, 0.3).sample("u", fractions, plan.problem.model.nu)
     np.testing.assert_array_equal(u, plan.control(0.3 + fractions * DURATION))
 
 
@@ -188,5 +180,5 @@ def test_refuses(changes: dict[str, Any], message: str) -> None:
 
 
 def test_one_coefficient_is_a_held_control() -> None:
-    one = Pieces(np.array([0.0, 1.0]), np.ones((1, 1, 1)))
+    one = PiecewisePolynomial(np.array([0.0, 1.0]), np.ones((1, 1, 1)))
     np.testing.assert_array_equal(one.at(np.array([0.0, 0.5, 1.0])), 1.0)

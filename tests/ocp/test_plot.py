@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from ocp import OCP, Box, Constraint, Model, Solution
-from ocp.plot import plot_solution
+from ocp.plotting.solution import plot_solution
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.problems import energy, pendulum, trajectory
 

@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ocp import OCP, Box, Constraint, Data, FreeTime, Guess, Parameter, ProblemError, Signal
+from ocp import OCP, Box, Constraint, FreeTime, Guess, Parameter, ProblemError, Signal
+from ocp.internal import RunData
 from solvers import MultipleShooting
 from tests.ocp.problems import DURATION, integrator, lag, pendulum
 
@@ -197,7 +198,7 @@ def test_a_guess_of_the_duration_is_positive(duration: float) -> None:
 def test_data_refuses_an_initial_time_that_is_not_finite(t0: float) -> None:
     ocp = integrator()
     with pytest.raises(ProblemError, match=re.escape(f"t0 = {t0}")):
-        Data.of(ocp, t0=t0)
+        RunData.of(ocp, t0=t0)
 
 
 def test_a_guess_is_sampled_at_any_instants() -> None:

@@ -24,7 +24,7 @@ from ocp import (
     evaluate,
     solve,
 )
-from ocp.probe import probe
+from ocp.problem.fingerprint import fingerprint
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.problems import energy, integrator, pendulum, trajectory
 from tests.tolerances import ORDER, ROUNDING
@@ -349,7 +349,7 @@ def test_load_takes_the_same_problem(tmp_path: Path, changes: dict[str, Any]) ->
 def test_a_probe_may_be_no_number(tmp_path: Path) -> None:
     """The square root is one at the start, and at some of the points not."""
     problem = moved(running_cost=lambda x, u: ca.sqrt(1.0 - 100.0 * ca.sumsqr(x)))
-    assert np.isnan(probe(problem)["running cost"]).any()
+    assert np.isnan(fingerprint(problem)["running cost"]).any()
     assert Solution.load(of(problem).save(tmp_path / "s"), problem).cost == 0.0
 
 

@@ -6,16 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ocp import (
-    OCP,
-    RK4,
-    Box,
-    Constraint,
-    Data,
-    FreeTime,
-    Stage,
-    Transcription,
-)
+from ocp import OCP, RK4, Box, Constraint, FreeTime
+from ocp.internal import RunData, Stage, Transcription
 from solvers import MultipleShooting
 from tests.ocp.differences import gradient
 from tests.ocp.problems import energy, integrator, lag, pendulum
@@ -65,15 +57,15 @@ def test_join_and_split_are_inverse(n: int, free: bool, seed: int) -> None:
 JOINED = {False: pendulum(), True: pendulum(horizon=FREE)}
 
 
-def evaluated(tr: Transcription, w: np.ndarray, data: Data) -> tuple[float, np.ndarray]:
+def evaluated(tr: Transcription, w: np.ndarray, data: RunData) -> tuple[float, np.ndarray]:
     program = tr.program
     function = ca.Function("fg", [program["x"], program["p"]], [program["f"], program["g"]])
     f, g = function(w, tr.data_vector(data))
     return float(f), np.array(g).ravel()
 
 
-def data_of(ocp: OCP, t0: float = 0.0) -> Data:
-    return Data.of(ocp, t0=t0)
+def data_of(ocp: OCP, t0: float = 0.0) -> RunData:
+    return RunData.of(ocp, t0=t0)
 
 
 def test_every_row_is_the_one_it_says() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, arm_cases
-from models import (
+from models.textbook import (
     bryson_denham,
     double_integrator_energy,
     double_integrator_minimum_time,

@@ -19,8 +19,8 @@ from ocp import (
     Model,
     Solution,
     Status,
-    Transcription,
 )
+from ocp.internal import Transcription
 from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 from tests.mpc.problems import cart
 from tests.solvers.problems import mass, tracker

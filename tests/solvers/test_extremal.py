@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import van_der_pol
-from ocp import OCP, RK4, Data
-from solvers.indirect.extremal import Extremals
-from solvers.indirect.segments import Schedule
+from models.textbook import van_der_pol
+from ocp import OCP, RK4
+from ocp.internal import RunData
+from solvers.indirect.boundary_value_problem import ExtremalProblem
+from solvers.indirect.shooting_segments import ShootingSchedule
 from tests.ocp.differences import jacobian
 from tests.solvers.problems import (
     circle_start,
@@ -33,9 +34,9 @@ PROBLEMS = {
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_jacobian(name: str, segments: int) -> None:
     ocp: OCP = PROBLEMS[name]()
-    extremals = Extremals.of(ocp, segments, 3, RK4())
-    data = Data.of(ocp, t0=0.2)
-    schedule = Schedule.of(ocp, data, 3 * segments)
+    extremals = ExtremalProblem.of(ocp, segments, 3, RK4())
+    data = RunData.of(ocp, t0=0.2)
+    schedule = ShootingSchedule.of(ocp, data, 3 * segments)
     rng = np.random.default_rng(1)
     shape = extremals.shape
     z = np.tile(np.concatenate([data.x0, np.zeros(shape.nx)]), (segments, 1))
@@ -57,7 +58,7 @@ def test_jacobian(name: str, segments: int) -> None:
 
 
 def test_layout_of_the_unknowns() -> None:
-    shape = Extremals.of(timed_transfer(), 2, 3, RK4()).shape
+    shape = ExtremalProblem.of(timed_transfer(), 2, 3, RK4()).shape
     z, nu = np.arange(8.0).reshape(2, 4), np.array([8.0, 9.0])
     v = shape.join(z, np.empty(0), nu, 1.5)
     np.testing.assert_array_equal(v, [*range(10), 1.5])
@@ -70,9 +71,9 @@ def test_layout_of_the_unknowns() -> None:
 def test_segments_together_are_the_whole_horizon() -> None:
     """Started on one trajectory, many segments reproduce it and have no gaps."""
     ocp = van_der_pol()
-    data = Data.of(ocp, t0=0.0)
-    one, four = Extremals.of(ocp, 1, 8, RK4()), Extremals.of(ocp, 4, 2, RK4())
-    schedule = Schedule.of(ocp, data, 8)
+    data = RunData.of(ocp, t0=0.0)
+    one, four = ExtremalProblem.of(ocp, 1, 8, RK4()), ExtremalProblem.of(ocp, 4, 2, RK4())
+    schedule = ShootingSchedule.of(ocp, data, 8)
     start = np.array([[1.0, 0.0, 1.7, 0.1]])
     whole = one.paths(start, schedule, ocp.duration)
     parts = four.paths(whole.nodes[:-1:2], schedule, ocp.duration)

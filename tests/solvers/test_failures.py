@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import van_der_pol
+from models.textbook import van_der_pol
 from ocp import (
     OCP,
     Box,
@@ -169,7 +169,7 @@ def test_infeasible_names_constraint_and_time(name: str, solver: Solver) -> None
 
 def test_without_rescue_a_failure_is_what_the_backend_says() -> None:
     make, *_ = INFEASIBLE["unreachable end"]
-    quick = solve(make(), MultipleShooting(20, rescue=False))
+    quick = solve(make(), MultipleShooting(20, feasibility_restoration=False))
     assert quick.status is Status.FAILED
     assert "Infeasible_Problem_Detected" in quick.message
     thorough = solve(make(), MultipleShooting(20))

@@ -7,16 +7,16 @@ import pytest
 
 from ocp import ProblemError
 from solvers import Armijo, FixedStep
-from solvers.gradient.line_search import Trial
+from solvers.gradient.line_search import LineSearchTrial
 
 
 def probe_of(f, seen: list[float] | None = None):
     """A probe whose trial carries the step as its only control."""
 
-    def probe(step: float) -> Trial:
+    def probe(step: float) -> LineSearchTrial:
         if seen is not None:
             seen.append(step)
-        return Trial(np.array([[step]]), np.zeros((2, 1)), f(step))
+        return LineSearchTrial(np.array([[step]]), np.zeros((2, 1)), f(step))
 
     return probe
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.cases import arm_scenario
-from models import (
+from models.textbook import (
     discrete_double_integrator,
     double_integrator_energy,
     double_integrator_minimum_time,

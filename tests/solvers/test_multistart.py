@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import double_integrator_energy, van_der_pol
+from models.textbook import double_integrator_energy, van_der_pol
 from ocp import OCP, Box, Constraint, Model, ProblemError, Status, evaluate
 from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart
 from tests.solvers.problems import changed, ends, point

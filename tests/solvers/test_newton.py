@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solvers.indirect.newton import NewtonResult, newton
+from solvers.indirect.newton_iteration import NewtonResult, newton
 from tests.tolerances import ROUNDING
 
 Function = Callable[[np.ndarray], np.ndarray]

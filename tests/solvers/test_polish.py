@@ -10,9 +10,9 @@ import pytest
 from benchmarks.cases import TEXTBOOK, Case, arm_cases
 from ocp import ProblemError, Solution, Status, evaluate, solve
 from solvers import IndirectShooting, MultipleShooting, polish
-from solvers.indirect.halved import change, finer
 from solvers.indirect.indirect_shooting import IndirectShootingProgram
 from solvers.indirect.second_order import SecondOrder
+from solvers.indirect.step_halving import change_when_halved, finer
 from tests.solvers.problems import saturated_transfer
 from tests.tolerances import RESIDUAL
 
@@ -103,7 +103,7 @@ def test_the_change_under_half_the_step_is_predicted(name: str) -> None:
     program = IndirectShooting(segments=15).build(direct.problem)
     half = finer(program)
     extremal, then = program.run(guess=direct), half.run(guess=direct)
-    predicted = change(extremal, program, half)
+    predicted = change_when_halved(extremal, program, half)
     assert predicted.cost == pytest.approx(abs(then.cost - extremal.cost), rel=1e-2)
     assert 0.0 < predicted.state < 1e-5
 

@@ -11,7 +11,6 @@ from ocp import (
     RK4,
     Box,
     Constraint,
-    Data,
     FreeTime,
     Parameter,
     ProblemError,
@@ -21,10 +20,12 @@ from ocp import (
     evaluate,
     solve,
 )
-from solvers import Kept, MultipleShooting, ReverseShooting, polish, seeds_around, self_motions
-from solvers.indirect.reverse import Reverse
-from solvers.indirect.reverse_shooting import Boundary
-from solvers.indirect.segments import Schedule
+from ocp.internal import RunData
+from solvers import MultipleShooting, ReverseShooting, polish
+from solvers.indirect.reverse.reverse_flow import ReverseFlow
+from solvers.indirect.reverse.reverse_shooting import Boundary
+from solvers.indirect.shooting_segments import ShootingSchedule
+from solvers.internal import InvariantManifold, seeds_around, self_motions
 from tests.solvers.problems import changed, point
 from tests.tolerances import DERIVATIVE, ROUNDING, STATIONARY, STEP
 
@@ -110,8 +111,8 @@ def test_a_parameter_moves_the_end() -> None:
 
 def test_sensitivities_match_finite_differences() -> None:
     ocp = arm_scenario("arm-015").ocp("sum")
-    reverse = Reverse.of(ocp, 60, RK4())
-    schedule = Schedule.of(ocp, Data.of(ocp, t0=0.0), 60)
+    reverse = ReverseFlow.of(ocp, 60, RK4())
+    schedule = ShootingSchedule.of(ocp, RunData.of(ocp, t0=0.0), 60)
     end = np.array([0.9, -1.0, -1.2])
     exact = reverse.slope(reverse.path(end, schedule), schedule, np.eye(3))
     sides = [reverse.starts(end + s * STEP * np.eye(3), schedule) for s in (1.0, -1.0)]
@@ -122,8 +123,8 @@ def test_sensitivities_match_finite_differences() -> None:
 
 def test_many_ends_at_once_are_the_same_as_one() -> None:
     ocp = arm_scenario("arm-015").ocp("sum")
-    reverse = Reverse.of(ocp, 40, RK4())
-    schedule = Schedule.of(ocp, Data.of(ocp, t0=0.0), 40)
+    reverse = ReverseFlow.of(ocp, 40, RK4())
+    schedule = ShootingSchedule.of(ocp, RunData.of(ocp, t0=0.0), 40)
     ends = np.array([[0.9, -1.0, -1.2], [1.0, -0.8, -1.3]])
     many = reverse.starts(ends, schedule)
     for i, end in enumerate(ends):
@@ -135,7 +136,7 @@ def test_many_ends_at_once_are_the_same_as_one() -> None:
 @pytest.mark.parametrize(("lengths", "components"), [((1.0, 1.0, 1.0), 1), ((1.6, 0.9, 0.5), 2)])
 def test_the_self_motion_is_traced_whole(lengths, components) -> None:
     ocp = bare(lengths=lengths)
-    manifold = Kept.of(ocp).at(0.0, np.zeros(0))
+    manifold = InvariantManifold.of(ocp).at(0.0, np.zeros(0))
     curves = self_motions(manifold, seeds_around(manifold, ocp.start()))
     assert len(curves) == components
     for curve in curves:
@@ -147,7 +148,7 @@ def test_the_self_motion_is_traced_whole(lengths, components) -> None:
 
 def test_both_elbows_are_on_the_self_motion() -> None:
     ocp = bare()
-    manifold = Kept.of(ocp).at(0.0, np.zeros(0))
+    manifold = InvariantManifold.of(ocp).at(0.0, np.zeros(0))
     target = np.array(PlanarArm((1.0, 1.0, 1.0)).end_effector(THETA0)).ravel()
     mirrored = -np.array(THETA0) + [2.0 * np.arctan2(target[1], target[0]), 0.0, 0.0]
     curves = self_motions(manifold, seeds_around(manifold, ocp.start()))
@@ -157,7 +158,7 @@ def test_both_elbows_are_on_the_self_motion() -> None:
 
 def test_a_trace_needs_redundancy_one() -> None:
     ocp = bare(lengths=(0.8,) * 4, theta0=(1.2, -0.9, -0.8, -0.6))
-    manifold = Kept.of(ocp).at(0.0, np.zeros(0))
+    manifold = InvariantManifold.of(ocp).at(0.0, np.zeros(0))
     with pytest.raises(UnsupportedProblem, match="has 2 dimensions"):
         self_motions(manifold, seeds_around(manifold, ocp.start()))
 
@@ -167,7 +168,7 @@ def test_a_target_out_of_reach_has_no_self_motion() -> None:
     x = ocp.model.x
     far = changed(ocp, invariants=(Constraint("far", x[:2] ** 2 + 1.0, 0.0, 0.0),))
     with pytest.raises(UnsupportedProblem, match="no configuration meets 'far'"):
-        Kept.of(far)
+        InvariantManifold.of(far)
 
 
 def test_refuses_what_it_cannot_treat() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario
-from models import (
+from models.textbook import (
     bryson_denham,
     discrete_double_integrator,
     double_integrator_energy,
@@ -19,7 +19,6 @@ from ocp import (
     OCP,
     RK4,
     Box,
-    Data,
     Euler,
     Guess,
     ProblemError,
@@ -29,6 +28,7 @@ from ocp import (
     evaluate,
     solve,
 )
+from ocp.internal import RunData
 from solvers import Armijo, FixedStep, MultipleShooting, Schuetz
 from tests.ocp.differences import gradient
 from tests.solvers.problems import OTHER, changed, circle_start, point, timed_transfer, tracker
@@ -139,7 +139,7 @@ def test_discrete_gradient(integrator, make: Callable[[], OCP]) -> None:
     program = solver.build(ocp)
     h = ocp.duration / n
     u = 0.5 * np.random.default_rng(3).normal(size=(n, 1))
-    data = Data.of(ocp, t0=0.0)
+    data = RunData.of(ocp, t0=0.0)
     times, nodes = np.arange(n)[None, :] * h, np.linspace(0.0, 1.0, n + 1)
     left, right = data.values.on(nodes)
 

@@ -6,15 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models import double_integrator_energy, van_der_pol
+from models.textbook import double_integrator_energy, van_der_pol
 from ocp import OCP, Constraint, Model, Solution, Status, solve
 from solvers import IndirectShooting, MultipleShooting, SecondOrder, polish
-from tests.solvers.problems import (
-    circle_start,
-    oscillator,
-    saturated_transfer,
-    timed_transfer,
-)
+from tests.solvers.problems import circle_start, oscillator, saturated_transfer, timed_transfer
 
 STEPS = 300
 

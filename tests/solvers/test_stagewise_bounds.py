@@ -8,25 +8,14 @@ from hypothesis import strategies as st
 
 from benchmarks.cases import arm_scenario
 from benchmarks.mpc import cart_pole_loop
-from models import cart_pole_upright, pendulum_swing_up
-from ocp import (
-    OCP,
-    RK4,
-    Box,
-    Compiler,
-    Data,
-    Guess,
-    Model,
-    Solution,
-    Status,
-    Transcription,
-    evaluate,
-    solve,
-)
+from models import cart_pole_upright
+from models.textbook import pendulum_swing_up
+from ocp import OCP, RK4, Box, Compiler, Guess, Model, Solution, Status, evaluate, solve
+from ocp.internal import RunData, Transcription
 from solvers import LinearMPC, MultipleShooting, StagewiseNewton
-from solvers.direct.clamped import Clamped
-from solvers.direct.intervals import Intervals
-from solvers.direct.newton_step import Iterate, NewtonStep
+from solvers.direct.newton.active_bounds import ActiveBounds
+from solvers.direct.newton.newton_step import Iterate, NewtonStep
+from solvers.direct.shooting_grid import ShootingGrid
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import changed, moving, point, quartic, tracker
 from tests.tolerances import STATIONARY
@@ -185,7 +174,7 @@ def test_the_step_is_the_minimum_of_the_quadratic_model(limit: float) -> None:
     nx, rng = ocp.model.nx, np.random.default_rng(2)
     at = Iterate(*[rng.normal(size=(rows, n + k)) / 3 for rows, k in ((nx, 1), (1, 0), (nx, 1))])
     at.u[:] = ocp.control_bounds.clip(at.u.T).T
-    data = Data(ocp.start(), 0.3, ocp.parameter_values())
+    data = RunData(ocp.start(), 0.3, ocp.parameter_values())
     transcription = Transcription(ocp, n, RK4())
     program = transcription.program
     lam = ca.MX.sym("lam", nx * n)
@@ -198,7 +187,7 @@ def test_the_step_is_the_minimum_of_the_quadratic_model(limit: float) -> None:
     H, q, A, gap = (np.array(value) for value in known)
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
-    schedule = Intervals.of(ocp, n, RK4(), fast=False).schedule(data, ocp.duration)
+    schedule = ShootingGrid.of(ocp, n, RK4(), fast=False).schedule(data, ocp.duration)
     view = newton.view(at, [*schedule, data.values.at(1.0)[0]])
     step = newton.step(view)
     assert step.is_settled
@@ -241,7 +230,7 @@ def test_exchanges_end_at_the_minimum(seed: int, size: int) -> None:
     matrix, linear = root @ root.T + 0.01 * np.eye(size), rng.normal(size=size)
     bounds = Box(-rng.uniform(0.0, 1.0, size), rng.uniform(0.0, 1.0, size))
     u = bounds.clip(rng.normal(size=size))
-    clamped = Clamped.at(u[:, None], (matrix @ u + linear)[:, None], bounds)
+    clamped = ActiveBounds.at(u[:, None], (matrix @ u + linear)[:, None], bounds)
     clamped._left = 3**size
     while True:
         du = clamped.moves[:, 0]

@@ -8,27 +8,27 @@ import pytest
 
 from benchmarks.cases import arm_scenario
 from benchmarks.mpc.arm_loop import loop
-from models import rayleigh, seven_links, van_der_pol
+from models import seven_links
+from models.textbook import rayleigh, van_der_pol
 from ocp import (
     OCP,
     RK4,
     Box,
     Compiler,
     Constraint,
-    Data,
     FreeTime,
     Guess,
     Model,
     ProblemError,
     Solution,
     Status,
-    Transcription,
     UnsupportedProblem,
     solve,
 )
+from ocp.internal import RunData, Transcription
 from solvers import MultipleShooting, StagewiseNewton
-from solvers.direct.intervals import Intervals
-from solvers.direct.newton_step import Iterate, NewtonStep
+from solvers.direct.newton.newton_step import Iterate, NewtonStep
+from solvers.direct.shooting_grid import ShootingGrid
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import OTHER, ends, moving, oscillator, point, quartic, tracker
 
@@ -120,7 +120,7 @@ def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
     transcription = Transcription(ocp, n, RK4())
     rng = np.random.default_rng(1)
     at = Iterate(*[rng.normal(size=(rows, n + k)) / 3 for rows, k in ((nx, 1), (nu, 0), (nx, 1))])
-    data = Data(ocp.start(), 0.3, ocp.parameter_values())
+    data = RunData(ocp.start(), 0.3, ocp.parameter_values())
     program = transcription.program
     lam = ca.MX.sym("lam", nx * n)
     lagrangian = program["f"] - ca.dot(lam, program["g"])
@@ -140,7 +140,7 @@ def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
     start = slope[:nx, 0] + (hessian @ dw)[:nx] - jacobian[:, :nx].T @ dense[moves.sum() :]
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
-    intervals = Intervals.of(ocp, n, RK4(), fast=False)
+    intervals = ShootingGrid.of(ocp, n, RK4(), fast=False)
     schedule = [*intervals.schedule(data, ocp.duration), data.values.at(1.0)[0]]
     view = newton.view(at, schedule)
     step = newton.step(view, sigma)
@@ -156,7 +156,7 @@ def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
     assert after == pytest.approx(0.0, abs=1e-12)
 
 
-def derivative(program: dict, w: np.ndarray, data: Data, transcription: Transcription):
+def derivative(program: dict, w: np.ndarray, data: RunData, transcription: Transcription):
     """The gradient of the cost in the unknowns."""
     slope = ca.gradient(program["f"], program["x"])
     function = ca.Function("slope", [program["x"], program["p"]], [slope])

@@ -2,7 +2,8 @@
 
 from benchmarks.cases import Case
 from ocp import Solution, SolverError
-from solvers import Certificate, Check, Effort, MultipleShooting, certify, multistart
+from solvers import Certificate, CertifyOptions, MultipleShooting, certify, multistart
+from solvers.internal import Check
 
 CLOSED_FORM = "closed form"
 # Digits in which a certificate has to agree with a derivation.
@@ -12,7 +13,7 @@ _CLOSED_FORM_ERROR = 1e-8
 _INTERVALS, _BETWEEN = (75, 300), 0.1
 
 
-def certify_case(case: Case, effort: Effort) -> Certificate:
+def certify_case(case: Case, effort: CertifyOptions) -> Certificate:
     """Certify the best optimum that a few direct starts find.
 
     The problem's own guess is the first of them. Where the case knows a closed form, that is a
@@ -31,7 +32,7 @@ def certify_case(case: Case, effort: Effort) -> Certificate:
     return certificate.beside(Check.at_most(CLOSED_FORM, apart, _CLOSED_FORM_ERROR, said))
 
 
-def _best_start(case: Case, effort: Effort) -> Solution:
+def _best_start(case: Case, effort: CertifyOptions) -> Solution:
     ocp = case.build()
     for intervals in _INTERVALS:
         solver = MultipleShooting(intervals)

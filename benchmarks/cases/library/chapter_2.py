@@ -6,7 +6,6 @@ import numpy as np
 
 from benchmarks.cases.library.entry import DISCRETE, SMOOTH, certified, entry, root
 from models import (
-    discrete_double_integrator,
     lq_regulator,
     mass_spring_damper,
     stable_plant,
@@ -14,6 +13,7 @@ from models import (
     thesis_tracking,
     unstable_plant,
 )
+from models.textbook import discrete_double_integrator
 from ocp import OCP
 
 _RICCATI = "Riccati recursion"

@@ -13,7 +13,7 @@ from benchmarks.cases.library.entry import (
     entry,
     root,
 )
-from models import (
+from models.textbook import (
     beam,
     breakwell,
     bryson_denham,

@@ -9,7 +9,7 @@ from benchmarks.cases.library.entry import (
     computed,
     entry,
 )
-from models import polar_arm, two_link_arm_energy, two_link_arm_minimum_time
+from models.textbook import polar_arm, two_link_arm_energy, two_link_arm_minimum_time
 
 _SWITCHED = "switching times optimised; best of 16 starts"
 

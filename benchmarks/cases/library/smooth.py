@@ -16,9 +16,9 @@ from benchmarks.cases.library.entry import (
     entry,
     root,
 )
-from models import (
+from models import cart_pole_swing_up
+from models.textbook import (
     brachistochrone,
-    cart_pole_swing_up,
     electric_vehicle,
     hanging_chain,
     hypersensitive,

@@ -2,7 +2,7 @@
 
 from benchmarks.cases.case import Published
 from benchmarks.cases.library.entry import DIRECT, certified, entry
-from models import rayleigh_constrained
+from models.textbook import rayleigh_constrained
 
 STATE_CONSTRAINTS = (
     entry(

@@ -4,7 +4,7 @@ from functools import partial
 
 from benchmarks.cases.case import Published
 from benchmarks.cases.library.entry import BETWEEN, BONNANS, DIRECT, DOLAN, computed, entry, root
-from models import catalyst_mixing, fuller, goddard, pendulum_minimum_time, two_catalysts
+from models.textbook import catalyst_mixing, fuller, goddard, pendulum_minimum_time, two_catalysts
 
 _ARCS = "shooting on the arcs of the minimum principle"
 _TUBE = "exponentials of three linear arcs, least over switches and singular control"

@@ -9,7 +9,7 @@ from replay import with_casadi
 from wire import CannotTreat, end_state, serve
 
 
-class RecedingHorizon:
+class DoMpcLoop:
     """Its MPC class: parameters along the horizon are its ``_tvp``."""
 
     def __init__(self, job: dict) -> None:
@@ -92,4 +92,4 @@ class RecedingHorizon:
 
 
 if __name__ == "__main__":
-    serve(RecedingHorizon)
+    serve(DoMpcLoop)

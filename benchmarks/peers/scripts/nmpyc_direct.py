@@ -9,7 +9,7 @@ from replay import function, reads_parameters
 from wire import end_state, serve
 
 
-class RecedingHorizon:
+class NmpycLoop:
     """What a step of its ``model.mpc`` does, from the state that we give; it simulates no plant.
 
     Where the dynamics depend on time, it builds its program anew in every step. Where costs
@@ -82,4 +82,4 @@ def _bounds(job: dict) -> nmpyc.constraints:
 
 
 if __name__ == "__main__":
-    serve(RecedingHorizon)
+    serve(NmpycLoop)

@@ -15,7 +15,7 @@ from benchmarks.peers import (
     Environment,
     InstallFailed,
     NotInstalled,
-    Report,
+    PeerReport,
     markdown,
     quicker,
     tables,
@@ -47,7 +47,7 @@ def test_a_peer_that_is_not_installed_is_said_with_what_to_type(capsys, empty_ca
     line = "qpmpc is not installed: python -m benchmarks peers install qpmpc"
     assert line in heard.err
     assert "LinearMPC" in heard.out
-    report = Report.read(out)
+    report = PeerReport.read(out)
     assert all(entry.ours for entry in report.entries)
 
 
@@ -89,7 +89,7 @@ def entry(name: str, **values: object) -> Entry:
     return Entry(job="j", contender=name, **{**measured, **values})  # type: ignore[arg-type]
 
 
-REPORT = Report(
+REPORT = PeerReport(
     machine={"cores": "2"},
     load=[0.5, 0.6],
     titles={"j": "a job"},
@@ -122,21 +122,23 @@ def test_tables_show_no_cost_of_what_violates_a_constraint():
 def test_a_report_comes_back_and_a_bad_one_is_refused(tmp_path, capsys):
     file = tmp_path / "r.json"
     REPORT.write(file)
-    assert Report.read(file) == REPORT
+    assert PeerReport.read(file) == REPORT
     assert main(["peers", "show", str(file)]) == 0
     assert "| quick |" in capsys.readouterr().out
     for text in ("{", "[]", '{"version": 0}', json.dumps({"version": 1, "entries": [{}]})):
         file.write_text(text, encoding="utf-8")
         with pytest.raises(BadResults):
-            Report.read(file)
+            PeerReport.read(file)
         assert main(["peers", "show", str(file)]) == 2
     with pytest.raises(BadResults):
-        Report.read(tmp_path / "none.json")
+        PeerReport.read(tmp_path / "none.json")
 
 
 def test_the_page_shows_the_committed_results():
     page = DATA.parent.parent / "docs" / "peers.md"
-    assert markdown(Report.read(DATA / "peers.json")).strip() in page.read_text(encoding="utf-8")
+    assert markdown(PeerReport.read(DATA / "peers.json")).strip() in page.read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.parametrize("name", ["control", "ssqp", "nmpyc"])
@@ -153,7 +155,7 @@ def test_scipy_solves_the_minimum_principle(tmp_path):
     out = tmp_path / "peers.json"
     words = ["peers", "run", "--peer", "scipy", "--problem", "cart-pole", "--cold", "1"]
     assert main([*words, "--out", str(out)]) == 0
-    found = Report.read(out).entries[-1]
+    found = PeerReport.read(out).entries[-1]
     assert found.contender == "scipy"
     assert found.status == "solved"
     assert found.good == 1

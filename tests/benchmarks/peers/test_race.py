@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.peers import Environment, Peer
+from benchmarks.peers import Environment, PeerPackage
 from benchmarks.peers import contender as contenders
 from benchmarks.peers.contender import OwnContender, PeerContender
 from benchmarks.peers.conversation import Conversation, PeerFailed
 from benchmarks.peers.job import Job, Situation
 from benchmarks.peers.race import race
-from models import double_integrator_energy
+from models.textbook import double_integrator_energy
 from ocp import Box
 from solvers import MultipleShooting
 from tests.benchmarks.peers.fakes import FAKE
@@ -29,7 +29,7 @@ def job():
 @pytest.fixture
 def peer(tmp_path):
     (tmp_path / "fake.py").write_text(FAKE, encoding="utf-8")
-    return Peer("fake", "a fake", "fake.py", folder=tmp_path)
+    return PeerPackage("fake", "a fake", "fake.py", folder=tmp_path)
 
 
 def run(job, peer, *settings, limit=5.0):

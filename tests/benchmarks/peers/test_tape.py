@@ -15,8 +15,10 @@ import benchmarks.peers
 from benchmarks.peers.export import exported
 from benchmarks.peers.job import Job, Situation
 from benchmarks.peers.tape import tape_of
-from models import cart_pole_swing_up, double_integrator_minimum_time
-from ocp import OCP, RK4, Box, Constraint, ProblemError, Stage
+from models import cart_pole_swing_up
+from models.textbook import double_integrator_minimum_time
+from ocp import OCP, RK4, Box, Constraint, ProblemError
+from ocp.internal import Stage
 
 SCRIPTS = Path(benchmarks.peers.__file__).parent / "scripts"
 

@@ -1,0 +1,1 @@
+"""Checks of arguments and expressions, and the exceptions they raise."""

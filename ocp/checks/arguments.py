@@ -1,0 +1,146 @@
+"""Checks of what a user gives, in words that name what is wrong."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.errors import ProblemError
+
+
+def check_numeric(values: ArrayLike, what: str) -> np.ndarray:
+    """Return ``values`` as a new float array, or raise ``ProblemError``."""
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"{what} is not numeric: {values!r}") from error
+
+
+def check_whole(value: object, what: str, *, least: int = 1) -> int:
+    """Return ``value`` if it is a whole number of at least ``least``.
+
+    Args:
+        value: what a user gave.
+        what: how a message calls it.
+        least: smallest number allowed.
+
+    Raises:
+        ProblemError: otherwise, and for a bool or a float, naming ``what``.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ProblemError(f"{what} must be a whole number of at least {least}, not {value!r}")
+    return int(value)
+
+
+def check_positive(
+    value: object, what: str, *, finite: bool = True, below: float = np.inf
+) -> float:
+    """Return ``value`` if it is one positive number, or raise ``ProblemError``.
+
+    Args:
+        value: what should be a number.
+        what: how a message calls it.
+        finite: whether infinity is refused.
+        below: limit that a finite number must not reach.
+    """
+    number = _number(value, finite, below)
+    if not number > 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be positive{_limit(finite, below)}")
+    return number
+
+
+def check_not_negative(
+    value: object, what: str, *, finite: bool = True, below: float = np.inf
+) -> float:
+    """Return ``value`` if it is one number, 0 or more; else as ``positive``."""
+    number = _number(value, finite, below)
+    if not number >= 0.0:
+        raise ProblemError(f"{what} = {value!r}, it must be 0 or more{_limit(finite, below)}")
+    return number
+
+
+def check_real(value: object, what: str) -> float:
+    """Return ``value`` if it is one finite number; else as ``positive``."""
+    number = _number(value, True, np.inf)
+    if not number > -np.inf:
+        raise ProblemError(f"{what} = {value!r}, a finite number is needed")
+    return number
+
+
+def _number(value: object, finite: bool, below: float) -> float:
+    """Return one number below a limit as it is, anything else as NaN."""
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    number = float(value) if is_number and not isinstance(value, bool) else np.nan
+    return number if number < below or (number == np.inf and not finite) else np.nan
+
+
+def _limit(finite: bool, below: float) -> str:
+    return f", below {below:g}" if below < np.inf else ", finite" * finite
+
+
+def check_instance(value: object, kind: type | tuple[type, ...], what: str) -> None:
+    """Check that ``value`` is of a kind.
+
+    Args:
+        value: what a user gave.
+        kind: class, or classes, that it may be of.
+        what: how a message calls it.
+
+    Raises:
+        ProblemError: otherwise, naming ``what``, its class and those allowed.
+    """
+    # A class has what its instances have: to a protocol it looks like one of them.
+    if isinstance(value, type) or not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        names = " or ".join(k.__name__ for k in kinds)
+        raise ProblemError(
+            f"{what} is {class_in_words(value)}, {names} is needed{_hint(value, kinds)}"
+        )
+
+
+def check_callable(value: object, what: str) -> None:
+    """Check that ``value`` can be called, or raise ``ProblemError`` as ``instance`` does."""
+    if isinstance(value, type) or not callable(value):
+        raise ProblemError(f"{what} is {class_in_words(value)}, a function is needed")
+
+
+def class_in_words(value: object) -> str:
+    """Return the class of a value, with its article."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'AEIOUaeiou' or name in ('MX', 'SX') else 'a'} {name}"
+
+
+def _hint(value: object, kinds: tuple[type, ...]) -> str:
+    """Return what was probably meant: an instance of a class, the solution inside a result."""
+    if isinstance(value, type):
+        return f": write {value.__name__}(...)" if {*kinds} & {*value.__mro__} else ""
+    return ": its .solution is one" if isinstance(getattr(value, "solution", None), kinds) else ""
+
+
+def check_numbers(
+    values: ArrayLike, size: int, what: str, *, finite: bool = True, repeat: bool = True
+) -> np.ndarray:
+    """Return ``values`` as a read-only float vector (size,).
+
+    Args:
+        values: numbers.
+        size: how many are needed.
+        what: how a message calls them.
+        finite: whether infinity is refused as well as NaN.
+        repeat: whether one number stands for all.
+
+    Raises:
+        ProblemError: on a wrong size, on NaN, and on infinity where ``finite``.
+    """
+    vector = check_numeric(values, what)
+    if repeat and vector.ndim == 0:
+        vector = np.full(size, float(vector))
+    vector = vector.reshape(-1)
+    if vector.size != size:
+        raise ProblemError(f"{what} has {vector.size} entries, {size} are needed")
+    wrong = np.flatnonzero(~np.isfinite(vector) if finite else np.isnan(vector))
+    if wrong.size:
+        needed = "a finite number" if finite else "a number"
+        raise ProblemError(f"{what}[{wrong[0]}] is {vector[wrong[0]]}, {needed} is needed")
+    vector.flags.writeable = False
+    return vector

@@ -1,0 +1,1 @@
+"""Controllers, plants, and the simulated loop of the two."""

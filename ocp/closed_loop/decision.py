@@ -1,0 +1,109 @@
+"""What a controller decides at one instant, and what stands behind it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from ocp.checks.errors import OCPError
+from ocp.solution.solution import Solution
+from ocp.solution.status import Status
+
+
+class InputSource(Enum):
+    """Which rung of the ladder the input comes from, best first."""
+
+    OPTIMAL = "the first control of a plan that meets the optimality conditions"
+    FEASIBLE = "the first control of a new plan that meets the constraints, but is not optimal"
+    SHIFTED = "the next control of an earlier plan whose remainder still meets the constraints"
+    BACKUP = "the backup law's, since no plan can be used"
+
+    @property
+    def is_planned(self) -> bool:
+        """Whether the plan was made for this very instant."""
+        return self in (InputSource.OPTIMAL, InputSource.FEASIBLE)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StepReport:
+    """One step of a controller, whether or not an input came of it.
+
+    Attributes:
+        t: when the state was measured [s].
+        applies_at: from when on the input is meant to act [s].
+        status: how the solver ended at this step; None where it was not asked or raised.
+        message: why the outcome is not ``OPTIMAL``, in words.
+        residual: the solver's optimality residual; inf without a plan of this step.
+        late: whether a new plan came too late for this step.
+        parameters: values of parameters and samples of signals of the horizon from
+            ``applies_at`` on, by name, as the solver gets them.
+        parameters_known: False where the controller's ``parameters`` failed; there are none then.
+        time_used: of this step [s].
+    """
+
+    t: float
+    applies_at: float
+    status: Status | None = None
+    message: str = ""
+    residual: float = np.inf
+    late: bool = False
+    parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    parameters_known: bool = True
+    time_used: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Decision(StepReport):
+    """An input that may be applied: finite, within its bounds, and named for what it is.
+
+    Attributes:
+        input: what the plant receives (m,).
+        outcome: which rung it comes from.
+        plan: the plan that the input comes from; None for the backup law.
+        age: steps since that plan was made, 0 for a new one.
+        clipped: by how much the input was moved to lie within its bounds.
+    """
+
+    input: np.ndarray
+    outcome: InputSource
+    plan: Solution | None = None
+    age: int = 0
+    clipped: float = 0.0
+
+
+class ControlRefused(OCPError, RuntimeError):
+    """No input can be answered for: there is no usable plan, and no backup law that helps.
+
+    Args:
+        message: why.
+        attempt: the step that was refused; None where a law refuses.
+    """
+
+    def __init__(self, message: str, attempt: StepReport | None = None) -> None:
+        """Keep the step."""
+        super().__init__(message)
+        self.attempt = attempt
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Anything that decides an input from a measurement: ``MPC``, ``Law``."""
+
+    @property
+    def delay(self) -> float:
+        """Time from measurement to effect [s], a multiple of the sampling interval."""
+        ...
+
+    def reset(self, acting: np.ndarray | None = None) -> None:
+        """Forget everything about earlier steps; ``acting`` acts until the first decision does."""
+        ...
+
+    def step(self, x: np.ndarray, t: float) -> Decision:
+        """Decide for a state x (nx,) measured at t [s].
+
+        Raises:
+            ControlRefused: if no input can be answered for.
+        """
+        ...

@@ -1,0 +1,188 @@
+"""What happened in a closed loop."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import ProblemError, SolverError
+from ocp.closed_loop.decision import Decision, InputSource
+from ocp.problem.fingerprint import differing_in, fingerprint_entries
+from ocp.problem.ocp import OCP
+from ocp.solution.archive import read_archive, write_archive
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# (axes, x (nx,), t [s]) -> the scene; (frames written, frames in all).
+Draw = Callable[["Axes", np.ndarray, float], object]
+Progress = Callable[[int, int], object]
+
+_OUTCOMES = tuple(InputSource)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Rollout:
+    """A closed loop of K steps, as the plant saw it.
+
+    Attributes:
+        plant: the problem that the plant is: its cost and constraints judge.
+        t: sampling instants [s], (K + 1,).
+        x: true states (K + 1, nx).
+        measured: what the controller was told (K, nx).
+        inputs: what acted in each interval (K, m); under a delay it was decided earlier.
+        outcomes: which rung each decision came from (K,).
+        messages: why, where it was not the first (K,).
+        costs: the plant's running cost over each interval (K,).
+        violation: the plant's largest violation of a bound or constraint.
+        worst: which, and the end of the sampling interval it happened in; empty where nothing is
+            violated.
+        drift: largest violation of the plant's invariants at the sampling instants, such as
+            the task error of an arm.
+        step_times: time of each decision [s], (K,).
+        clipped: by how much each input was clipped (K,).
+        ended: why the loop ended early; empty if it did not.
+        decisions: all of them, with their plans; empty where the rollout was loaded.
+        late: intervals from a decision to its effect. The inputs of the first so many were
+            decided before the rollout begins, or are the initial one.
+    """
+
+    plant: OCP
+    t: np.ndarray
+    x: np.ndarray
+    measured: np.ndarray
+    inputs: np.ndarray
+    outcomes: tuple[InputSource, ...]
+    messages: tuple[str, ...]
+    costs: np.ndarray
+    violation: float
+    worst: str
+    drift: float
+    step_times: np.ndarray
+    clipped: np.ndarray
+    ended: str = ""
+    decisions: tuple[Decision, ...] = ()
+    late: int = 0
+
+    def __repr__(self) -> str:
+        """Return one line: what was controlled, what it cost, and who decided."""
+        return (
+            f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
+            f"violation {self.violation:.2g}, {self.decided_by}>"
+        )
+
+    @property
+    def decided_by(self) -> str:
+        """How many decisions came from which rung, and why the loop ended early, in words."""
+        said = ", ".join(f"{n} {o.name.lower()}" for o, n in self.counts.items() if n)
+        return f"{said or 'no decision'}{f'; ended: {self.ended}' if self.ended else ''}"
+
+    def acting(self, k: int) -> InputSource | None:
+        """The rung whose input acts in interval k; None where it was decided before t0."""
+        return self.outcomes[k - self.late] if k >= self.late else None
+
+    @property
+    def cost(self) -> float:
+        """The closed-loop cost: the plant's running cost along its own trajectory."""
+        return float(self.costs.sum())
+
+    @property
+    def counts(self) -> dict[InputSource, int]:
+        """How many decisions came from each rung."""
+        found = Counter(self.outcomes)
+        return {outcome: found[outcome] for outcome in InputSource}
+
+    def or_raise(self) -> "Rollout":
+        """Return self, or raise ``SolverError`` if the loop ended early."""
+        if self.ended:
+            raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}")
+        return self
+
+    def plot(self) -> "Figure":
+        """Return a figure of states, inputs, outcomes and cost over time."""
+        from ocp.plotting.rollout import plot_rollout  # matplotlib takes a second
+
+        return plot_rollout(self)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        draw: Draw | None = None,
+        frames_per_second: int = 20,
+        speed: float = 1.0,
+        progress: Progress | None = None,
+    ) -> Path:
+        """Write the loop as an animated GIF; return its path.
+
+        States and inputs grow with time; ahead of now the plan that is followed is dashed, its
+        inputs only where what is sent are its controls. The title says the rung. A rollout
+        that was loaded has no plans.
+
+        Args:
+            path: with the suffix ``.gif``; its folder is made.
+            draw: (axes, x, t) draws the scene, on empty axes for every frame; x is interpolated
+                between the samples.
+            frames_per_second: 1 to 50.
+            speed: seconds of the loop in a second of the film.
+            progress: called with the number of frames written and of all frames.
+
+        Raises:
+            ProblemError: if there is nothing to show, there would be thousands of frames, or an
+                argument is out of its range.
+        """
+        from ocp.plotting.animation import animate_rollout  # matplotlib takes a second
+
+        return animate_rollout(
+            self,
+            path,
+            draw=draw,
+            frames_per_second=frames_per_second,
+            speed=speed,
+            progress=progress,
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
+        content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
+        content |= {
+            "outcomes": np.array([_OUTCOMES.index(o) for o in self.outcomes], dtype=int),
+            "messages": np.array(self.messages, dtype=str),
+            "plant": self.plant.name,
+        }
+        content |= fingerprint_entries(self.plant)
+        return write_archive(path, "rollout", content)
+
+    @classmethod
+    def load(cls, path: str | Path, plant: OCP) -> "Rollout":
+        """Read a rollout of ``plant`` from a file that ``save`` wrote.
+
+        Raises:
+            ProblemError: if the file belongs to another plant, by its name or by what its
+                functions and bounds are, or is no rollout.
+        """
+        check_instance(plant, OCP, f"the plant that {path} is to be a loop with")
+        needed = {"outcomes", "messages", "plant", *_ARRAYS, *_SCALARS}
+        data = read_archive(path, "rollout", needed)
+        if str(data["plant"]) != plant.name:
+            raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
+        if other := differing_in(data, plant):
+            raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
+        if not np.isin(data["outcomes"], range(len(_OUTCOMES))).all():
+            raise ProblemError(f"{path} is no saved rollout: an outcome is none of the four")
+        return cls(
+            plant=plant,
+            **{name: data[name] for name in _ARRAYS},
+            **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            outcomes=tuple(_OUTCOMES[i] for i in data["outcomes"]),
+            messages=tuple(map(str, data["messages"])),
+        )
+
+
+_ARRAYS = ("t", "x", "measured", "inputs", "costs", "step_times", "clipped")
+_SCALARS = {"violation": float, "worst": str, "drift": float, "ended": str, "late": int}

@@ -1,0 +1,193 @@
+"""The loop: measure, decide, apply, and write down."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import (
+    check_callable,
+    check_instance,
+    check_numbers,
+    check_positive,
+    check_whole,
+)
+from ocp.checks.errors import ProblemError
+from ocp.closed_loop.decision import Controller, ControlRefused, Decision
+from ocp.closed_loop.delay import delay_steps
+from ocp.closed_loop.plant import Plant, RunningPlant
+from ocp.closed_loop.rollout import Rollout
+from ocp.problem.constraint import Constraint
+from ocp.problem.ocp import OCP
+
+SensorFault = Callable[[np.ndarray, float], np.ndarray]
+Observer = Callable[[np.ndarray, Decision | ControlRefused], None]
+
+
+def closed_loop(
+    controller: Controller,
+    plant: Plant,
+    x0: ArrayLike,
+    duration: float,
+    *,
+    dt: float,
+    seed: int = 0,
+    initial_input: ArrayLike | None = None,
+    head_start: bool = False,
+    sensors: SensorFault | None = None,
+    watch: Observer | None = None,
+) -> Rollout:
+    """Run a controller on a plant.
+
+    The input decided from the measurement at t acts from t + ``controller.delay`` on. Until the
+    first one does, the initial input acts, unless there is a head start. Where the controller
+    refuses, the rollout ends and says why.
+
+    Args:
+        controller: ``MPC``, ``Law``, or whatever decides.
+        plant: the truth.
+        x0: true first state (nx,).
+        duration: [s], a multiple of dt up to rounding.
+        dt: sampling interval [s].
+        seed: of noise and jitter.
+        initial_input: acts during the delay at the start (m,); default: zero, within bounds.
+        head_start: the controller is asked from t = -delay on, while the plant is kept at x0, so
+            that its first input acts from t = 0 on. It should rest there under the initial input,
+            or a delay that is compensated predicts what does not happen. These decisions are
+            seen by ``watch``; those of the rollout begin at t = 0.
+        sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
+        watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is.
+
+    Raises:
+        ProblemError: if the plant takes another input than the controller sends, the duration is
+            no multiple of dt, or a function of the plant returns what does not fit.
+    """
+    check_instance(controller, Controller, "closed loop: controller")
+    check_instance(plant, Plant, "closed loop: plant")
+    for fault, what in ((sensors, "sensors"), (watch, "watch")):
+        if fault is not None:
+            check_callable(fault, f"closed loop: {what}")
+    check_positive(dt, "closed loop: dt [s]")
+    check_positive(duration, "closed loop: duration [s]")
+    check_whole(seed, "closed loop: seed", least=0)
+    steps = round(duration / dt)
+    if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
+        raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
+    box, m = plant.ocp.control_bounds, plant.ocp.model.nu
+    first = box.clip(np.zeros(m))
+    if initial_input is not None:
+        first = check_numbers(initial_input, m, "closed loop: initial_input")
+    controller.reset(first)
+    late = delay_steps(controller.delay, dt)
+    journal = _Journal(plant.ocp, plant.started(x0, seed), late)
+    ahead = [] if head_start else [first] * late
+    for k in range(-late if head_start else 0, steps):
+        measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
+        told = sensors(measured, t) if sensors else measured
+        try:
+            decision = _decided(controller, told, t, plant.ocp, watch)
+        except ControlRefused as refusal:
+            journal.ended = str(refusal)
+            break
+        ahead.append(decision.input)
+        if k >= 0:
+            journal.advance(told, decision, ahead.pop(0), dt)
+        if not np.isfinite(journal.running.x).all():
+            journal.ended = "the plant's state blows up"
+            break
+    return journal.rollout()
+
+
+def _decided(
+    controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: Observer | None
+) -> Decision:
+    """Ask the controller, and tell who watches what it says, or that it refuses."""
+    try:
+        decision = controller.step(told, t)
+    except ControlRefused as refusal:
+        if watch:
+            watch(told, refusal)
+        raise
+    if decision.input.shape != (plant.model.nu,):
+        raise ProblemError(
+            f"closed loop: the controller sends {decision.input.size} inputs, "
+            f"the plant '{plant.name}' takes {plant.model.nu}"
+        )
+    if watch:
+        watch(told, decision)
+    return decision
+
+
+@dataclass(eq=False)
+class _Journal:
+    """A rollout while it is made."""
+
+    ocp: OCP
+    running: RunningPlant
+    late: int
+    t: list[float] = field(default_factory=list)
+    x: list[np.ndarray] = field(default_factory=list)
+    measured: list[np.ndarray] = field(default_factory=list)
+    inputs: list[np.ndarray] = field(default_factory=list)
+    decisions: list[Decision] = field(default_factory=list)
+    costs: list[float] = field(default_factory=list)
+    violation: float = 0.0
+    worst: str = ""
+    ended: str = ""
+
+    def __post_init__(self) -> None:
+        self.t.append(self.running.t)
+        self.x.append(self.running.x)
+
+    def advance(self, told: np.ndarray, decision: Decision, acting: np.ndarray, dt: float) -> None:
+        """Let an input act for an interval, and write everything down."""
+        cost, excess, worst = self.running.advance(acting, dt)
+        if excess > self.violation:
+            self.violation, self.worst = excess, f"{worst} before t = {self.running.t:.4g} s"
+        self.measured.append(told)
+        self.inputs.append(acting)
+        self.decisions.append(decision)
+        self.costs.append(cost)
+        self.t.append(self.running.t)
+        self.x.append(self.running.x)
+
+    def rollout(self) -> Rollout:
+        """Return it."""
+        t, x = np.array(self.t), np.array(self.x)
+        m = self.ocp.model
+        return Rollout(
+            plant=self.ocp,
+            t=t,
+            x=x,
+            measured=np.array(self.measured).reshape(-1, m.nx),
+            inputs=np.array(self.inputs).reshape(-1, m.nu),
+            outcomes=tuple(d.outcome for d in self.decisions),
+            messages=tuple(d.message for d in self.decisions),
+            costs=np.array(self.costs),
+            violation=self.violation,
+            worst=self.worst,
+            drift=_drift(self.ocp, t, x),
+            step_times=np.array([d.time_used for d in self.decisions]),
+            clipped=np.array([d.clipped for d in self.decisions]),
+            ended=self.ended,
+            decisions=tuple(self.decisions),
+            late=self.late,
+        )
+
+
+def _drift(ocp: OCP, t: np.ndarray, x: np.ndarray) -> float:
+    """Largest violation of the invariants; their parameters are the declared ones."""
+    if not ocp.invariants:
+        return 0.0
+    p = ocp.parameter_values().at(0.0)[0]
+    rows = np.array([ocp.functions.invariants(*row, p) for row in zip(x, t, strict=True)])
+    return _excess(ocp.invariants, rows.reshape(len(t), -1))
+
+
+def _excess(constraints: tuple[Constraint, ...], rows: np.ndarray) -> float:
+    first, worst = 0, 0.0
+    for c in constraints:
+        worst = max(worst, float(c.box.excess(rows[:, first : first + c.size]).max(initial=0.0)))
+        first += c.size
+    return worst

@@ -1,0 +1,1 @@
+"""CasADi Functions as machine code, and called with arrays."""

@@ -1,0 +1,231 @@
+"""CasADi Functions as machine code: generated, built, kept in a cache, and loaded again."""
+
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import Any
+
+import casadi as ca
+
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import ProblemError
+
+_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+# The name that the generated C gives itself; the content of a library must not depend on its file.
+_UNIT = "stage"
+
+
+class InterpretedWarning(UserWarning):
+    """A function could not be compiled: it runs interpreted, slower, with the same numbers."""
+
+
+class _Unbuildable(Exception):
+    """Why there is no machine code, in words."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """What turns C into machine code, and where that is kept.
+
+    Args:
+        command: as a shell would take it; None: ``$CC``, or the first of cc, gcc, clang.
+        flags: its options.
+        cache: folder; None: ``ocp-toolkit`` in the user's cache folder (``$XDG_CACHE_HOME``
+            where it is set).
+        optimised: up to so many characters of C. Beyond, a compiler would optimise for minutes,
+            and ``-O0`` is added to the flags: still several times faster than interpreted.
+    """
+
+    command: str | None = None
+    flags: tuple[str, ...] = ("-O3", "-march=native")
+    cache: Path | None = None
+    optimised: int = 800_000
+
+    @property
+    def found(self) -> list[str]:
+        """The command as a list; empty where there is none."""
+        wanted = self.command or os.environ.get("CC", "")
+        candidates = [wanted] if wanted else ["cc", "gcc", "clang"]
+        for words in map(shlex.split, candidates):
+            if words and shutil.which(words[0]):
+                return words
+        return []
+
+    def words(self, code: str) -> list[str]:
+        """Return command and flags for some C; empty where there is no compiler."""
+        if not (command := self.found):
+            return []
+        return [*command, *self.flags, *(["-O0"] if len(code) > self.optimised else [])]
+
+    @property
+    def folder(self) -> Path:
+        """Where the libraries are kept."""
+        return self.cache or _user_cache() / "ocp-toolkit"
+
+
+def compiled(
+    function: ca.Function, *, along: Sequence[str] = (), compiler: Compiler | None = None
+) -> ca.Function:
+    """Return a function as machine code, with the same inputs and outputs.
+
+    The library is kept under a name made from the generated C, compiler, flags and processor:
+    what was built once is loaded. It is built under a temporary name in the same folder and
+    then renamed, so that two processes may build at once. Where it cannot be built or kept,
+    the interpreted function comes back, and ``InterpretedWarning`` says why, once per reason.
+
+    Meant for functions of the size of one stage; map them afterwards. A whole transcribed
+    problem takes minutes to compile. A function that brings its derivatives along, such as
+    ``differentiable_step``, keeps them.
+
+    Args:
+        function: what to compile.
+        along: names of the inputs along which first and second derivatives are generated too.
+            In derivatives of the result all other inputs count as constants; with none it has
+            no derivatives at all.
+        compiler: default: the machine's.
+
+    Raises:
+        ProblemError: if ``along`` names no input.
+    """
+    check_instance(function, ca.Function, "compiled: the function")
+    for name in along:
+        if name not in function.name_in():
+            raise ProblemError(f"compiled: {function.name()} has no input '{name}'")
+    options = {}
+    if along:
+        options = {"is_diff_in": [name in along for name in function.name_in()]}
+        # Tidied, a function that brings its derivatives along would lose them.
+        if function.is_diff_in() != options["is_diff_in"]:
+            function = _tidied(function, options)
+    try:
+        library = _library(c_code(function, along), compiler or Compiler())
+        return _loaded(function.name(), library, options)
+    except _Unbuildable as reason:
+        _announce(f"no compiled functions: {reason}. They run interpreted.")
+        return function
+
+
+def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:
+    """Return the C of a function, and of what CasADi asks for to differentiate it twice.
+
+    Args:
+        function: what to write.
+        along: inputs along which it is differentiated; with none there are no derivatives.
+    """
+    check_instance(function, ca.Function, "c_code: the function")
+    functions = [function]
+    if along:
+        adjoint = function.reverse(1)
+        functions += [function.jacobian(), adjoint, adjoint.jacobian()]
+    generator = ca.CodeGenerator(_UNIT)
+    try:
+        for each in functions:
+            generator.add(_tidied(each))
+        return generator.dump()
+    except RuntimeError as error:  # a node of the graph that CasADi cannot write as C
+        raise _Unbuildable(f"{function.name()} cannot be written as C ({error})") from error
+
+
+def _tidied(function: ca.Function, options: dict | None = None) -> ca.Function:
+    """Return a function with every common subexpression computed once; about 3/4 of the code."""
+    if options is None:
+        options = {"is_diff_in": function.is_diff_in(), "is_diff_out": function.is_diff_out()}
+    # Any: SX and MX, which the type stubs keep apart.
+    is_scalar = function.is_a("SXFunction")
+    inputs: Any = function.sx_in() if is_scalar else function.mx_in()
+    outputs: Any = function.call(inputs, True, False)
+    outputs = ca.cse(outputs) if is_scalar else outputs
+    names = function.name_in(), function.name_out()
+    return ca.Function(function.name(), inputs, outputs, *names, options)
+
+
+def _library(code: str, compiler: Compiler) -> Path:
+    """Return the library of some C code, built unless it is there."""
+    words = compiler.words(code)
+    if not words:
+        raise _Unbuildable(
+            f"there is no compiler '{compiler.command or os.environ.get('CC') or 'cc'}'"
+        )
+    what = [code, *words, _version(tuple(compiler.found)), _processor()]
+    key = sha256("\0".join(what).encode()).hexdigest()
+    library = compiler.folder / f"{key[:32]}{_SUFFIX}"
+    if not library.exists():
+        try:
+            compiler.folder.mkdir(parents=True, exist_ok=True)
+            _build(code, words, library)
+        except OSError as error:
+            raise _Unbuildable(f"{compiler.folder} cannot be written ({error})") from error
+    return library
+
+
+def _build(code: str, command: list[str], library: Path) -> None:
+    """Build a library under a name of its own, then give it its name in one step."""
+    with NamedTemporaryFile(
+        "w", suffix=".c", dir=library.parent, delete=False, encoding="utf-8"
+    ) as source:
+        source.write(code)
+    c_file = Path(source.name)
+    built = c_file.with_suffix(_SUFFIX)
+    words = [*command, "-shared", "-fPIC", str(c_file), "-o", str(built), "-lm"]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode != 0 or not built.exists():
+            lines = (done.stderr or done.stdout).strip().splitlines() or ["without a word"]
+            raise _Unbuildable(f"{shlex.join(command)} failed: {lines[0][:200]}")
+        built.replace(library)
+    finally:
+        for left in (c_file, built):
+            with suppress(OSError):
+                left.unlink(missing_ok=True)
+
+
+def _loaded(name: str, library: Path, options: dict) -> ca.Function:
+    try:
+        return ca.external(name, str(library), options)
+    except RuntimeError as error:  # what CasADi raises where the library cannot be opened
+        raise _Unbuildable(f"{library} cannot be loaded; remove it") from error
+
+
+def _user_cache() -> Path:
+    if os.environ.get("XDG_CACHE_HOME"):
+        return Path(os.environ["XDG_CACHE_HOME"])
+    if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"])
+    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+
+
+@cache
+def _version(command: tuple[str, ...]) -> str:
+    """What a compiler says about itself."""
+    try:
+        words = [*command, "--version"]
+        return subprocess.run(words, capture_output=True, text=True, check=False).stdout
+    except OSError:
+        return ""
+
+
+@cache
+def _processor() -> str:
+    """What ``-march=native`` depends on: model and instruction sets."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        known = {line.split(":")[0].strip(): line for line in reversed(lines)}
+        return "".join(known.get(key, "") for key in ("model name", "flags", "Features"))
+    except OSError:
+        return f"{platform.machine()} {platform.processor()}"
+
+
+@cache
+def _announce(message: str) -> None:
+    warnings.warn(message, InterpretedWarning, stacklevel=3)

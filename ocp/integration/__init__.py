@@ -1,0 +1,1 @@
+"""One-step integrators: state and cost after one interval, with derivatives."""

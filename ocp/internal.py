@@ -1,0 +1,59 @@
+"""What solvers, models and benchmarks build on, and users of solvers need not know."""
+
+from ocp.checks.arguments import (
+    check_callable,
+    check_instance,
+    check_not_negative,
+    check_numbers,
+    check_positive,
+    check_real,
+    check_whole,
+)
+from ocp.codegen.buffered_function import BufferedFunction
+from ocp.codegen.compile import c_code, compiled
+from ocp.integration.differentiable_step import differentiable_step
+from ocp.integration.one_step import Stage, interpolate
+from ocp.integration.stage_hessian import stage_hessian
+from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
+from ocp.linear.stationary import stationary
+from ocp.minimum_principle.hamiltonian import hamiltonian
+from ocp.minimum_principle.necessary_conditions import symbol_type
+from ocp.nlp.constraint_rows import ConstraintRow, most_violated, rows_of
+from ocp.nlp.transcription import Transcription
+from ocp.problem.parameters import ParameterValues
+from ocp.problem.run_data import RunData
+from ocp.problem.start_feasibility import start_violation
+from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+
+__all__ = [
+    "BufferedFunction",
+    "ConstraintRow",
+    "LQData",
+    "LinearQuadratic",
+    "Matrices",
+    "ParameterValues",
+    "PiecewisePolynomial",
+    "RunData",
+    "Stage",
+    "Transcription",
+    "bernstein",
+    "c_code",
+    "check_callable",
+    "check_instance",
+    "check_not_negative",
+    "check_numbers",
+    "check_positive",
+    "check_real",
+    "check_whole",
+    "compiled",
+    "differentiable_step",
+    "elevated",
+    "hamiltonian",
+    "interpolate",
+    "most_violated",
+    "rows_of",
+    "stage_hessian",
+    "start_violation",
+    "stationary",
+    "symbol_type",
+]

@@ -1,0 +1,1 @@
+"""Pontryagin's minimum principle, derived symbolically."""

@@ -1,0 +1,191 @@
+"""The flight recorder: every step on disk as it happens, and any of them played again."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+import numpy as np
+
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import ProblemError
+from ocp.closed_loop.decision import ControlRefused, Decision
+from ocp.mpc.mpc import MPC
+from ocp.mpc.record_format import Record, header, packed, read_header, records
+from ocp.solution.archive import opened
+from ocp.solution.solution import Solution
+
+
+class FlightRecorder:
+    """Writes a record after every step of an ``MPC``, whether it was decided or refused.
+
+    The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
+    the shapes of its arrays, these as doubles (what was measured, the input, the plan where
+    another one was found good, the parameters), and the message. A record that was cut off by a
+    crash is ignored later. Use it as a context manager and give its ``watch`` to the loop. A record
+    begins with a controller that knows nothing yet: a loop resets it; else call ``reset``.
+
+    Args:
+        mpc: whose steps are recorded.
+        path: the file, overwritten.
+
+    Raises:
+        ProblemError: if the file cannot be written.
+    """
+
+    def __init__(self, mpc: MPC, path: str | Path) -> None:
+        """Open the file."""
+        check_instance(mpc, MPC, "flight recorder: mpc")
+        check_instance(path, (str, Path), "the path of a flight record")
+        self._mpc, self.path = mpc, Path(path)
+        self._last: Solution | None = None
+        self._file: BinaryIO = opened(path, "wb", "flight record")
+        self._begun, self._t = False, -np.inf
+
+    def __enter__(self) -> Self:
+        """Return the recorder."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def watch(self, measured: np.ndarray, decided: Decision | ControlRefused) -> None:
+        """Write down a step of the controller that has just decided, or refused.
+
+        Raises:
+            ProblemError: if it is a step of another run, or of a controller that is no ``MPC``.
+        """
+        step = decided.attempt if isinstance(decided, ControlRefused) else decided
+        if step is None:
+            raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
+        if not self._begun:
+            self._begin()
+        if step.t < self._t:
+            raise ProblemError(f"{self.path}: t goes back to {step.t:g} s; a record is of one run")
+        self._t = step.t
+        plan = self._mpc.memory.plan
+        self._file.write(packed(measured, step, plan if plan is not self._last else None))
+        self._file.flush()
+        self._last = plan
+
+    def _begin(self) -> None:
+        """Write the first line: only the loop tells the controller what acts at first."""
+        mpc, self._begun = self._mpc, True
+        names = [entry.name for entry in mpc.ocp.parameters]
+        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names, mpc.acting))
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A step as it was and as it is when decided again.
+
+    Attributes:
+        record: from the file.
+        decision: made now; None where the controller refuses now.
+    """
+
+    record: Record
+    decision: Decision | None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether input (to the last bit) and outcome are the recorded ones, or it is refused."""
+        if self.decision is None or self.record.input is None:
+            return self.decision is None and self.record.input is None
+        return self.decision.outcome is self.record.outcome and np.array_equal(
+            self.decision.input, self.record.input
+        )
+
+
+def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
+    """Decide a recorded step again, from what was known then.
+
+    Exactly so, but for what a clock ended: a run that met its ``time_limit`` may get further now.
+
+    Args:
+        mpc: a controller of the same problem, solver and options; its memory is not touched.
+        path: a file that a ``FlightRecorder`` wrote.
+        step: 0 for the first record.
+
+    Raises:
+        ProblemError: if the file is not of this problem and solver, or ends before the step.
+    """
+    return next(replay_all(mpc, path, [step]))
+
+
+def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Replay]:
+    """Decide several recorded steps again, and yield them in their order; see ``replay``.
+
+    Raises:
+        ProblemError: if the file is not of this problem and solver, or ends before a step.
+    """
+    check_instance(mpc, MPC, "replay: mpc")
+    with opened(path, "rb", "flight record") as file:
+        said = read_header(file, path)
+    for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
+        if said[name] != own:
+            raise ProblemError(f"{path} records the {name} '{said[name]}', not '{own}'")
+    wanted, known = set(steps), _Known()
+    again = replace(mpc, parameters=known)
+    again.reset(said.get("acting"))
+    memory = again.memory
+    for k, record in enumerate(records(path)):
+        if not wanted:
+            return
+        # The state of a solver comes from all the steps before.
+        if k in wanted or again.is_stateful:
+            again.memory, known.record = memory, record
+            found = Replay(record, _again(again, record))
+            if k in wanted:
+                wanted.remove(k)
+                yield found
+        memory = memory.after(
+            record.input, _plan(mpc, record), mpc.steps_late, tried=record.is_solvable
+        )
+    if wanted:
+        raise ProblemError(f"{path} has no step {min(wanted)}")
+
+
+@dataclass(eq=False)
+class _Known:
+    """The parameters as they were known at a recorded step, instead of the controller's own."""
+
+    record: Record | None = None
+
+    def __call__(self, t: float) -> Mapping[str, np.ndarray]:
+        if self.record is None or not self.record.parameters_known:
+            raise ProblemError("nobody knew them")
+        return self.record.parameters
+
+
+def _again(mpc: MPC, record: Record) -> Decision | None:
+    try:
+        return mpc.step(record.measured, record.t, late=record.late)
+    except ControlRefused:
+        return None
+
+
+def _plan(mpc: MPC, record: Record) -> Solution | None:
+    if record.plan is None:
+        return None
+    return Solution(
+        problem=mpc.ocp,
+        solver=repr(mpc.solver),
+        status=record.plan.status,
+        t=record.plan.t,
+        x=record.plan.x,
+        x0=record.plan.x0,
+        costate=record.plan.costate,
+        u=record.plan.u,
+        control_kind=record.plan.kind,
+        breaks=record.plan.breaks,
+        cost=0.0,
+        parameters=record.parameters,
+    )

@@ -1,0 +1,323 @@
+"""Receding-horizon control (Algorithm 3): a controller around any solver."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import (
+    check_callable,
+    check_instance,
+    check_not_negative,
+    check_numbers,
+    check_numeric,
+    check_positive,
+    check_real,
+)
+from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.closed_loop.decision import ControlRefused, Decision, StepReport
+from ocp.closed_loop.delay import delay_steps
+from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
+from ocp.closed_loop.plant import Plant
+from ocp.closed_loop.rollout import Rollout
+from ocp.closed_loop.simulate import Observer, closed_loop
+from ocp.mpc.backup_selection import Backup, BackupOption, select_backup
+from ocp.mpc.controller_state import ControllerState
+from ocp.mpc.fallback_ladder import FallbackLadder
+from ocp.mpc.plant_input import PlantInput
+from ocp.mpc.solver_options import with_mpc_defaults
+from ocp.mpc.step_inputs import StepInputs
+from ocp.problem.ocp import OCP
+from ocp.problem.parameters import ParameterValues
+from ocp.solution.solution import Solution
+from ocp.solution.solver import InitialGuess, Solver
+from ocp.solution.status import Status
+
+Parameters = Callable[[float], Mapping[str, ArrayLike]]
+
+
+@dataclass(eq=False, kw_only=True)
+class MPC:
+    """A receding-horizon controller around any solver, for a problem that moves with time.
+
+    At every step the problem is solved from the measured state, warm started by the last plan
+    shifted to now (states, controls and costates), and its first control applied. An input is
+    always finite and within its bounds. Where the new plan cannot be used, the next rung of
+    this ladder is taken, and the decision says so:
+
+    1. the new plan, ``OPTIMAL``, or ``FEASIBLE`` where the solver stopped early: then the
+       model is run under its controls, and it must meet the constraints;
+    2. the remainder of the last good plan, ``SHIFTED``, run on the model from the measured
+       state: it must meet the constraints;
+    3. the ``backup`` law, ``BACKUP``;
+    4. ``ControlRefused``.
+
+    Where two runs of the solver in a row bring no good plan, every other one starts afresh, as the
+    first step does, since the last plan may be what leads it astray.
+
+    An answer that took longer than ``budget`` came too late for its step: it is not applied
+    but remembered, and the next rungs see it as the last plan. Source: thesis Algorithm 3,
+    2.2.1; [Mayne et al. 2000].
+
+    Args:
+        ocp: the problem over one horizon. Its t is absolute time: t0 enters at every step.
+        solver: any solver. Where it, or one inside it, has a ``time_limit`` and leaves it open, a
+            run gets 10 s, so that the loop goes on where third-party code does not return.
+        dt: sampling interval [s]; need not divide the horizon, since a shifted plan is
+            interpolated. For a discrete-time model it is that model's step. The input is held
+            for dt: plans whose controls are held for less are applied only in their first part.
+        applied: what the plant receives.
+        backup: (x, t) -> input (m,); ``"default"``: ``saturated_lqr`` where the problem is
+            linear-quadratic, ``instantaneous`` where it is that of a redundant arm, else
+            ``"hold"``: the last input; None: refuse. ``backup_law`` says which is in force.
+        parameters: t -> parameters and signals of the horizon that starts there. If it raises,
+            or what it returns does not fit, at the first step that is an error; later there
+            is no new plan, and the last one is judged by the parameters it was made with.
+        guess: where the first step starts; a ``Solution`` of any solver. Indirect shooting
+            needs a good one: from its own it may converge to a spurious extremal and stay there.
+        delay: time from measurement to effect [s], a multiple of dt.
+        compensate: whether the state is predicted over the delay, with the inputs that are
+            already on their way; if not, the plan starts from the measured state.
+        budget: time for a step [s]; None: unlimited.
+        tolerance: by how much an input may leave its bounds, or a plan the constraints, before
+            that is a failure; an input that leaves them by less is clipped, and it is recorded.
+        compiled: whether the solver, where it has such an option, and the model run as machine
+            code. The first build takes seconds; see ``compiled``.
+
+    Attributes:
+        backup_law: the law in force, and why the problem suggests no other.
+
+    Raises:
+        ProblemError: if interval, delay, budget, backup or bounds do not fit the problem.
+        UnsupportedProblem: if the solver cannot treat it, its start is free (here it is
+            measured), or its final time is.
+    """
+
+    ocp: OCP
+    solver: Solver
+    dt: float
+    applied: PlantInput = field(default_factory=PlantInput)
+    backup: BackupOption = "default"
+    parameters: Parameters | None = None
+    guess: InitialGuess | None = None
+    delay: float = 0.0
+    compensate: bool = True
+    budget: float | None = None
+    tolerance: float = 1e-6
+    compiled: bool = True
+    backup_law: Backup = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Check the numbers, and do all symbolic work."""
+        self._check()
+        self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
+        self.steps_late = delay_steps(self.delay, self.dt)
+        self.reset()
+        self._ladder = FallbackLadder(
+            ocp=self.ocp,
+            program=with_mpc_defaults(self.solver, compiled=self.compiled).build(self.ocp),
+            applied=self.applied,
+            backup=self.backup_law,
+            guess=self.guess,
+            dt=self.dt,
+            tolerance=self.tolerance,
+            compiled=self.compiled,
+        )
+
+    def _check(self) -> None:
+        check_instance(self.ocp, OCP, "MPC: ocp")
+        check_instance(self.solver, Solver, "MPC: solver")
+        check_instance(self.applied, PlantInput, "MPC: applied")
+        if self.parameters is not None:
+            check_callable(self.parameters, "MPC: parameters")
+        self.ocp.first_guess(self.guess)
+        name, model, dt = self.ocp.name, self.ocp.model, self.dt
+        if self.ocp.has_free_time:
+            raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
+        if self.ocp.has_free_start:
+            raise UnsupportedProblem(f"MPC of {name}: its start is free, here it is measured")
+        check_positive(dt, f"MPC of {name}: dt [s]")
+        if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
+            raise ProblemError(f"MPC of {name}: dt = {dt} s, but the model's step is {model.dt} s")
+        if dt > self.ocp.duration * (1.0 + 1e-9):
+            raise ProblemError(
+                f"MPC of {name}: dt = {dt} s is longer than the horizon of {self.ocp.duration} s"
+            )
+        if self.budget is not None:
+            check_positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
+        check_not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
+
+    @property
+    def is_stateful(self) -> bool:
+        """Whether the solver's own answers depend on the runs before."""
+        return self._ladder.program.is_stateful
+
+    def reset(self, acting: ArrayLike | None = None) -> None:
+        """Forget the last plan and input.
+
+        Args:
+            acting: input that acts until the first decision does (m,), so that a delay is
+                compensated from the first step on; None: nothing is known of it.
+        """
+        size = self.applied.size(self.ocp)
+        first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
+        # Without a delay the first decision acts at once.
+        self.acting = first if self.steps_late else None
+        self.memory = ControllerState(pending=() if first is None else (first,) * self.steps_late)
+
+    def step(
+        self,
+        x: ArrayLike,
+        t: float,
+        *,
+        late: bool | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Decision:
+        """Decide.
+
+        Args:
+            x: measured state (nx,); NaN is a missing measurement.
+            t: when it was measured [s].
+            late: whether the answer counts as late; default: by the clock.
+            parameters: of the horizon that starts when the input acts, by name; default: what
+                the controller's own ``parameters`` say.
+
+        Raises:
+            ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
+            ControlRefused: if no rung holds.
+        """
+        started = perf_counter()
+        moment = self._moment(x, t, parameters)
+        ladder = self._ladder
+        plan, status = ladder.solve(moment)
+        used = perf_counter() - started
+        if late is None:
+            late = self.budget is not None and used > self.budget
+        late = late and plan is not None
+        if late:
+            moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
+        new = ladder.new(moment, plan) if plan is not None and not late else None
+        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self._last)
+        good = plan if late or new is not None else None
+        self.memory = self.memory.after(
+            choice and choice.input, good, self.steps_late, tried=moment.is_solvable
+        )
+        said = _account(moment, plan, status, late, perf_counter() - started)
+        if choice is None:
+            raise ControlRefused(f"t = {t:g} s: {said['message']}", StepReport(**said))
+        followed = choice.plan
+        return Decision(
+            **said,
+            input=choice.input,
+            outcome=choice.outcome,
+            plan=followed,
+            age=round((moment.at - followed.t[0]) / self.dt) if followed and not new else 0,
+            clipped=choice.clipped,
+        )
+
+    def run(
+        self,
+        plant: Plant,
+        x0: ArrayLike,
+        duration: float,
+        *,
+        seed: int = 0,
+        watch: Observer | None = None,
+    ) -> Rollout:
+        """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval.
+
+        Raises:
+            ProblemError: if states or inputs of plant and problem differ in number.
+        """
+        check_instance(plant, Plant, f"MPC of {self.ocp.name}: plant")
+        for what, ours, theirs in (
+            ("states", self.ocp.model.nx, plant.ocp.model.nx),
+            ("inputs", self.applied.size(self.ocp), plant.ocp.model.nu),
+        ):
+            if ours != theirs:
+                raise ProblemError(
+                    f"MPC of {self.ocp.name}: {ours} {what}, but the plant '{plant.ocp.name}' "
+                    f"has {theirs}"
+                )
+        return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+
+    @property
+    def _last(self) -> np.ndarray | None:
+        """The last input: decided, or acting until the first decision does."""
+        return self.acting if self.memory.input is None else self.memory.input
+
+    def _moment(
+        self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None
+    ) -> StepInputs:
+        """Collect what a decision is made from."""
+        name, plan = self.ocp.name, self.memory.plan
+        at, state = (
+            check_real(t, f"MPC of {name}: t [s]") + self.delay,
+            check_numeric(x, f"MPC of {name}: x"),
+        )
+        if state.shape != (self.ocp.model.nx,):
+            raise ProblemError(
+                f"MPC of {name}: x has shape {state.shape}, ({self.ocp.model.nx},) is needed"
+            )
+        values, why = self._informed(at, parameters)
+        since = plan.t[0] if why and plan else at
+        is_measured = all(map(isfinite, state.tolist()))
+        if not is_measured:  # without a plan the backup law sees what was measured
+            state = state if plan is None else plan.state(at)
+        elif self.compensate and self.memory.pending:
+            state = self._predicted(state, t, values.at((at - since) / self.ocp.duration)[0])
+        return StepInputs(
+            t=float(t),
+            at=at,
+            start=state,
+            is_measured=is_measured,
+            plan=plan,
+            values=values,
+            parameters=values.as_dict(),
+            since=since,
+            parameters_known=not why,
+            cold_start=self.memory.cold_start,
+            reasons=why,
+        )
+
+    def _informed(
+        self, at: float, given: Mapping[str, ArrayLike] | None
+    ) -> tuple[ParameterValues, list[str]]:
+        """Return the parameters of a horizon, or those of the last plan and why."""
+        if given is not None or self.parameters is None:
+            return self.ocp.parameter_values(given), []
+        try:
+            return self.ocp.parameter_values(self.parameters(at)), []
+        except CALLBACK_ERRORS as error:
+            if self.memory.input is None:  # nothing has moved yet: let it be mended
+                raise
+            known = self.memory.plan.parameters if self.memory.plan else None
+            why = f"no parameters from t = {at:g} s on: {error}"
+            return self.ocp.parameter_values(known), [why]
+
+    def _predicted(self, x: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
+        """Return the state after the delay, under the inputs that are on their way."""
+        for k, given in enumerate(self.memory.pending):
+            x = self._ladder.advanced(x, given, t + k * self.dt, p)
+        return x
+
+
+def _account(
+    moment: StepInputs, plan: Solution | None, status: Status | None, late: bool, used: float
+) -> dict[str, Any]:
+    """Return what is said of a step whatever came of it, by the names of ``StepReport``."""
+    return {
+        "t": moment.t,
+        "applies_at": moment.at,
+        "status": status,
+        "message": "; ".join(moment.reasons),
+        "residual": plan.residual if plan else np.inf,
+        "late": late,
+        "parameters": moment.parameters if moment.parameters_known else {},
+        "parameters_known": moment.parameters_known,
+        "time_used": used,
+    }

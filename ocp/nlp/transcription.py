@@ -1,0 +1,249 @@
+"""A problem on a grid as a nonlinear program, shared by the direct solvers."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from ocp.checks.arguments import check_instance
+from ocp.codegen.compile import compiled
+from ocp.integration.differentiable_step import differentiable_step
+from ocp.integration.one_step import Integrator, Stage
+from ocp.nlp.constraint_rows import ConstraintRow, most_violated, rows_of
+from ocp.problem.functions import stacked
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
+
+
+@dataclass(frozen=True, eq=False)
+class Transcription:
+    r"""Multiple shooting: states at nodes, controls held, integration in between.
+
+    .. math:: x_{k+1} - F(x_k, u_k) = 0, \quad k = 0 \dots N-1
+
+    Unknowns are ordered (z_0, u_0, z_1, u_1, ..., z_N), constraints stage by stage, so that
+    both a general sparse and a stagewise solver see their structure. A free final time is a
+    state T of z with T_{k+1} = T_k. Path constraints hold at the nodes; what the start alone
+    decides is not imposed there. The stage is built once and mapped.
+
+    Attributes:
+        ocp: the problem.
+        intervals: number of intervals N; a discrete-time problem brings its own.
+        integrator: one-step method of each interval.
+        compiled: whether stage and path constraints run as machine code.
+    """
+
+    ocp: OCP
+    intervals: int
+    integrator: Integrator
+    compiled: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no problem; the numbers are checked by the solvers."""
+        check_instance(self.ocp, OCP, "the problem to transcribe")
+
+    # -- layout -----------------------------------------------------------------------
+
+    @property
+    def n(self) -> int:
+        """Number of intervals."""
+        return self.ocp.steps or self.intervals
+
+    @property
+    def nz(self) -> int:
+        """States per node, the free final time included."""
+        return self.ocp.model.nx + int(self.ocp.has_free_time)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.n * (self.nz + self.ocp.model.nu) + self.nz
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Nodes as fractions of the horizon, (N + 1,)."""
+        return np.linspace(0.0, 1.0, self.n + 1)
+
+    def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
+        return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])
+
+    def split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return z (N + 1, nz) and u (N, nu) of a vector of unknowns."""
+        stages = w[: -self.nz].reshape(self.n, -1)
+        return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
+
+    @property
+    def is_control(self) -> np.ndarray:
+        """Which unknowns are controls, bool (size,)."""
+        z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
+        return self.join(z, u).astype(bool)
+
+    @property
+    def is_later_state(self) -> np.ndarray:
+        """Which unknowns are states after the start, bool (size,)."""
+        z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)
+        z[0] = 0.0
+        return self.join(z, np.zeros((self.n, self.ocp.model.nu))).astype(bool)
+
+    def duration(self, w: np.ndarray) -> float:
+        """Return final time minus t0 [s] of a vector of unknowns."""
+        return float(w[-1]) if self.ocp.has_free_time else self.ocp.duration
+
+    # -- the stage ----------------------------------------------------------------------
+
+    @cached_property
+    def step(self) -> ca.Function:
+        """One interval: (x, u, t, h, p0, p1) -> (x after it, cost), ``Stage.step``."""
+        if self.compiled:
+            return self._fast(differentiable_step(self.ocp, self.integrator))
+        return Stage.of(self.ocp, self.integrator, held=True).step
+
+    @cached_property
+    def _path(self) -> ca.Function:
+        path = self.ocp.functions.path
+        return self._fast(path) if path.numel_out(0) else path
+
+    def _fast(self, function: ca.Function) -> ca.Function:
+        """Compile, where asked for, with derivatives along what depends on the unknowns."""
+        if not self.compiled:
+            return function
+        unknown = {"x", "u", "u0"} | ({"t", "h"} if self.ocp.has_free_time else set())
+        return compiled(function, along=[n for n in function.name_in() if n in unknown])
+
+    # -- the program --------------------------------------------------------------------
+
+    @cached_property
+    def program(self) -> dict[str, ca.MX]:
+        """Unknowns x, cost f, constraints g and data p, as ``casadi.nlpsol`` takes them."""
+        ocp, nx, nu, n_p, n = (
+            self.ocp,
+            self.ocp.model.nx,
+            self.ocp.model.nu,
+            self.ocp.p.numel(),
+            self.n,
+        )
+        w = ca.MX.sym("w", self.size)
+        data = ca.MX.sym("data", 1 + n_p * (2 * n + 1))
+        t0 = data[0]
+        p_left = ca.reshape(data[1 : 1 + n_p * n], n_p, n)
+        p_right = ca.reshape(data[1 + n_p * n : 1 + 2 * n_p * n], n_p, n)
+        p_final = data[1 + 2 * n_p * n :]
+        stages = ca.reshape(w[: -self.nz], self.nz + nu, n)
+        z = ca.horzcat(stages[: self.nz, :], w[-self.nz :])
+        x, u = z[:nx, :], stages[self.nz :, :]
+        duration = z[nx, :-1] if ocp.has_free_time else ca.DM(np.full((1, n), ocp.duration))
+        h = duration / n
+        t = t0 + h * ca.DM(np.arange(n)).T
+        t_final = t0 + (z[nx, -1] if ocp.has_free_time else ocp.duration)
+        after, costs = self.step.map(n)(x[:, :-1], u, t, h, p_left, p_right)
+        if ocp.has_free_time:
+            after = ca.vertcat(after, duration)
+        inside = self._path.map(n)(x[:, :-1], u, t, p_left)
+        first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
+        by_stage = ca.vertcat(z[:, 1:] - after, inside)
+        g = ca.vertcat(
+            by_stage[:, 0], first, ca.vec(by_stage[:, 1:]), self._last(x[:, -1], t_final, p_final)
+        )
+        f = ca.sum2(costs) + ocp.functions.terminal_cost(x[:, -1], t_final, p_final)
+        return {"x": w, "f": f, "g": g, "p": data}
+
+    @cached_property
+    def rows(self) -> tuple[ConstraintRow, ...]:
+        """What each row of g says, in order."""
+        ocp = self.ocp
+        gap = [
+            ConstraintRow(f"dynamics of {name}", "dynamics", 1, 0.0, 0.0)
+            for name in ocp.model.x_names
+        ]
+        gap += [ConstraintRow("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
+        path = rows_of(ocp.at("path"), "path")
+        on_control = self._depends_on_control
+        rows: list[ConstraintRow] = []
+        for k in range(self.n):
+            rows += [replace(row, node=k + 1) for row in gap]
+            decided = k == 0 and not ocp.has_free_start
+            for row, depends in zip(path, on_control, strict=True):
+                free = {"lower": -np.inf, "upper": np.inf} if decided and not depends else {}
+                rows.append(replace(row, node=k, **free))
+            if k == 0:
+                rows += rows_of(ocp.at("initial"), "initial")
+        last = [row for row, depends in zip(path, on_control, strict=True) if not depends]
+        rows += [
+            replace(row, node=self.n) for row in last + rows_of(ocp.at("terminal"), "terminal")
+        ]
+        return tuple(rows)
+
+    def bounds(self, data: RunData) -> dict[str, np.ndarray]:
+        """Return lbx, ubx, lbg, ubg for a start."""
+        ocp, nu = self.ocp, self.ocp.model.nu
+        state, time, control = ocp.state_bounds, ocp.time_box, ocp.control_bounds
+        result = {}
+        for key, side in (("lbx", "lower"), ("ubx", "upper")):
+            z = np.tile(np.asarray(getattr(state, side)), (self.n + 1, 1))
+            if not ocp.has_free_start:
+                z[0] = data.x0
+            if ocp.has_free_time:
+                z = np.hstack([z, np.full((self.n + 1, 1), np.asarray(getattr(time, side))[0])])
+            u = np.tile(np.asarray(getattr(control, side)).reshape(nu), (self.n, 1))
+            result[key] = self.join(z, u)
+        result["lbg"] = np.array([r.lower for r in self.rows])
+        result["ubg"] = np.array([r.upper for r in self.rows])
+        return result
+
+    def data_vector(self, data: RunData) -> np.ndarray:
+        """Return the numbers of the program's p."""
+        left, right = data.values.on(self.fractions)
+        return np.concatenate([[data.t0], left.ravel(), right.ravel(), data.values.at(1.0)[0]])
+
+    def worst(
+        self, w: np.ndarray, g: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> tuple[float, ConstraintRow | None]:
+        """Return the largest violation of any constraint or state bound, and which it is."""
+        return most_violated(w, g, bounds, self.rows, self._bound)
+
+    def _bound(self, i: int) -> ConstraintRow:
+        """Return what the bound of an unknown says."""
+        node, entry = divmod(i, self.nz + self.ocp.model.nu)
+        names = [*self.ocp.model.x_names, *["final time"] * int(self.ocp.has_free_time)]
+        return ConstraintRow(
+            f"bound of {(*names, *self.ocp.model.u_names)[entry]}", "path", node, 0.0, 0.0
+        )
+
+    # -- costates -----------------------------------------------------------------------
+
+    def costates(
+        self, w: np.ndarray, lam_x: np.ndarray, lam_g: np.ndarray, data: RunData
+    ) -> np.ndarray:
+        """Return dJ*/dx at the nodes, (N + 1, nx), from the multipliers.
+
+        At nodes 1..N minus the multiplier of the gap; at node 0 what balances the start.
+        """
+        nx, initial = self.ocp.model.nx, self.ocp.at("initial")
+        later = -lam_g[self._at("dynamics")].reshape(self.n, nx)
+        first = -lam_x[:nx]
+        if initial:
+            p = data.values.at(0.0)[0]
+            first = (
+                first
+                - np.array(self.ocp.functions.initial_slope(w[:nx], data.t0, p)).T
+                @ lam_g[self._at("initial")]
+            )
+        return np.vstack([first, later])
+
+    # -- pieces ---------------------------------------------------------------------------
+
+    def _at(self, place: str) -> np.ndarray:
+        return np.array([row.place == place for row in self.rows])
+
+    @cached_property
+    def _depends_on_control(self) -> tuple[bool, ...]:
+        return tuple(bool(b) for b in self.ocp.functions.path_on_control)
+
+    @cached_property
+    def _last(self) -> ca.Function:
+        m, path = self.ocp.model, stacked(self.ocp.at("path"))
+        rows = [path[i] for i, depends in enumerate(self._depends_on_control) if not depends]
+        last = ca.vertcat(ca.SX(0, 1), *rows, stacked(self.ocp.at("terminal")))
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [last])

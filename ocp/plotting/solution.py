@@ -1,0 +1,194 @@
+"""What people look at: states, controls, costates and constraints over time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ocp.problem.constraint import Box, Constraint
+from ocp.solution.solution import Solution
+
+# Lines beyond this many take their colours from a continuous map and share a wide legend.
+_FEW = 8
+_LEGEND_ROWS = 12
+_POINTS = 600
+# Lines that vary by less are drawn with their bounds, wherever these are.
+_FLAT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class _Panel:
+    """One pair of axes: a line per column of ``values``, with bounds.
+
+    A held quantity has one row less than there are instants.
+    """
+
+    title: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    t: np.ndarray
+    values: np.ndarray
+    box: Box | None = None
+
+    @property
+    def is_held(self) -> bool:
+        return len(self.values) < len(self.t)
+
+
+def plot_solution(solution: Solution) -> Figure:
+    """Return a figure of a solution; save it with ``figure.savefig``.
+
+    States, controls, costates, and where the problem has them path constraints and
+    invariants; bounds near the lines are thin and dashed. Held quantities are steps, those
+    of an extremal are smooth between its nodes.
+
+    Args:
+        solution: of any solver. What is drawn and what the title gives as its cost is its
+            own; only ``evaluate`` says what its controls really do.
+
+    Returns:
+        a figure that no window and no pyplot state knows of.
+    """
+    panels = [panel(solution) for panel in _PANELS]
+    shown = [p for p in panels if p.values.shape[1]]
+    figure = Figure(figsize=(9.0, 1.0 + 2.1 * len(shown)), layout="constrained")
+    axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, ax in zip(shown, axes, strict=True):
+        _draw(ax, panel)
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(solution.t[0], solution.t[-1])
+    figure.suptitle(
+        f"{solution.problem.name}: {solution.status.name.lower().replace('_', ' ')}, "
+        f"own cost {solution.cost:.6g}",
+        fontsize="large",
+    )
+    figure.align_ylabels()
+    return figure
+
+
+# -- what is drawn --------------------------------------------------------------------
+
+
+def _instants(solution: Solution) -> np.ndarray:
+    """The nodes, and for controls that are curved between them many instants more."""
+    if solution.control_kind not in ("extremal", "polynomial"):
+        return solution.t
+    return np.union1d(solution.t, np.linspace(solution.t[0], solution.t[-1], _POINTS))
+
+
+def _states(solution: Solution) -> _Panel:
+    ocp, t = solution.problem, _instants(solution)
+    m = ocp.model
+    return _Panel("states", m.x_names, m.x_units, t, solution.state(t), ocp.state_bounds)
+
+
+def _controls(solution: Solution) -> _Panel:
+    ocp, t = solution.problem, _instants(solution)
+    m = ocp.model
+    u = solution.u if solution.control_kind == "held" else solution.control(t)
+    return _Panel("controls", m.u_names, m.u_units, t, u, ocp.control_bounds)
+
+
+def _costates(solution: Solution) -> _Panel:
+    names = tuple(f"∂J/∂({name})" for name in solution.problem.model.x_names)
+    t = _instants(solution)
+    return _Panel("costates", names, (), t, solution.costate_at(t))
+
+
+def _path(solution: Solution) -> _Panel:
+    ocp, t = solution.problem, _instants(solution)
+    given = [solution.state(t), solution.control(t), t[:, None], _parameters(solution, t)]
+    return _constraints("path constraints", ocp.at("path"), ocp.functions.path, given, t)
+
+
+def _invariants(solution: Solution) -> _Panel:
+    ocp, t = solution.problem, _instants(solution)
+    given = [solution.state(t), t[:, None], _parameters(solution, t)]
+    return _constraints("invariants", ocp.invariants, ocp.functions.invariants, given, t)
+
+
+def _parameters(solution: Solution, t: np.ndarray) -> np.ndarray:
+    return solution.data.values.at((t - solution.t[0]) / solution.duration)
+
+
+def _constraints(
+    title: str,
+    constraints: tuple[Constraint, ...],
+    function: ca.Function,
+    given: list[np.ndarray],
+    t: np.ndarray,
+) -> _Panel:
+    names = tuple(name for c in constraints for name in _rows_of(c))
+    rows = np.array(function.map(len(t))(*[a.T for a in given])).T.reshape(len(t), len(names))
+    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
+    upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
+    return _Panel(title, names, (), t, rows, Box(lower, upper))
+
+
+def _rows_of(c: Constraint) -> tuple[str, ...]:
+    return (c.name,) if c.size == 1 else tuple(f"{c.name} {i}" for i in range(c.size))
+
+
+_PANELS: tuple[Callable[[Solution], _Panel], ...] = (
+    _states,
+    _controls,
+    _costates,
+    _path,
+    _invariants,
+)
+
+
+# -- how it is drawn ------------------------------------------------------------------
+
+
+def _draw(ax: Axes, panel: _Panel) -> None:
+    count = len(panel.names)
+    few = count <= _FEW
+    colours = colormaps["tab10"](np.arange(count))
+    if not few:
+        colours = colormaps["turbo"](np.linspace(0.03, 0.97, count))
+    for i, (name, colour) in enumerate(zip(_labels(panel), colours, strict=True)):
+        rows = panel.values[:, i]
+        if panel.is_held:
+            rows = np.append(rows, rows[-1])
+            ax.step(panel.t, rows, where="post", color=colour, label=name, linewidth=1.4)
+        else:
+            ax.plot(panel.t, rows, color=colour, label=name, linewidth=1.4)
+    if panel.box is not None:
+        _draw_bounds(ax, panel.box, panel.values, colours)
+    shared = f" [{panel.units[0]}]" if len(set(panel.units)) == 1 else ""
+    ax.set_ylabel(panel.title + shared)
+    ax.grid(alpha=0.25, linewidth=0.6)
+    ax.margins(x=0.0, y=0.08)
+    ax.legend(
+        loc="center left",
+        bbox_to_anchor=(1.005, 0.5),
+        ncols=-(-count // _LEGEND_ROWS),
+        frameon=False,
+        fontsize="small" if few else 7.0,
+        labelspacing=0.3,
+        handlelength=1.4,
+    )
+
+
+def _draw_bounds(ax: Axes, box: Box, values: np.ndarray, colours: np.ndarray) -> None:
+    """Draw bounds that are not far from the lines: grey where shared, else in the line's colour."""
+    bounds = np.vstack([np.asarray(box.lower, float), np.asarray(box.upper, float)])
+    span = np.ptp(values)
+    reach = 2.0 * span if span > _FLAT else np.inf
+    near = (bounds > values.min() - reach) & (bounds < values.max() + reach)
+    for bound in np.unique(bounds[near]):
+        owners = np.flatnonzero((bounds == bound).any(axis=0))
+        colour = colours[owners[0]] if len(owners) == 1 else "0.4"
+        ax.axhline(bound, color=colour, linestyle=(0, (5, 4)), linewidth=0.8)
+
+
+def _labels(panel: _Panel) -> tuple[str, ...]:
+    """The names, with their units where these differ."""
+    if len(set(panel.units)) < 2:
+        return panel.names
+    return tuple(f"{name} [{u}]" for name, u in zip(panel.names, panel.units, strict=True))

@@ -1,0 +1,1 @@
+"""The description of an optimal control problem, and what follows from it directly."""

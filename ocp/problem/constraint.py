@@ -1,0 +1,131 @@
+"""Bounds and constraints, each with a name a message can use."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_instance, check_numbers
+from ocp.checks.errors import ProblemError
+from ocp.checks.expressions import check_column
+
+Place = Literal["path", "initial", "terminal"]
+PLACES: tuple[Place, ...] = get_args(Place)
+_RELATIONS = (ca.OP_LE, ca.OP_LT, ca.OP_EQ, ca.OP_NE)
+
+
+def check_place(value: object, what: str) -> None:
+    """Check that ``value`` is where a constraint may hold, or raise ``ProblemError``."""
+    if value not in PLACES:
+        raise ProblemError(f"{what} = {value!r} is no place; {', '.join(map(repr, PLACES))} are")
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Simple bounds ``lower <= v <= upper``; a number holds for every component.
+
+    Args:
+        lower: lower bound, a number or (n,); ``-inf``: none.
+        upper: upper bound, a number or (n,); ``inf``: none.
+    """
+
+    lower: ArrayLike = -np.inf
+    upper: ArrayLike = np.inf
+
+    def sized(self, size: int, what: str) -> "Box":
+        """Return the box with bounds of shape (size,), checked."""
+        lower = check_numbers(self.lower, size, f"{what}: lower", finite=False)
+        upper = check_numbers(self.upper, size, f"{what}: upper", finite=False)
+        wrong = np.flatnonzero((lower > upper) | (lower == np.inf) | (upper == -np.inf))
+        if wrong.size:
+            i = int(wrong[0])
+            raise ProblemError(f"{what}[{i}]: no number lies between {lower[i]} and {upper[i]}")
+        return Box(lower, upper)
+
+    @cached_property
+    def is_active(self) -> bool:
+        """Whether any component is bounded at all."""
+        return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+    def clip(self, value: np.ndarray) -> np.ndarray:
+        """Return the nearest point of the box, along the last axis."""
+        # np.clip and np.nan_to_num cost several times what they do to a short row.
+        return np.minimum(np.maximum(value, self.lower), self.upper)
+
+    def clip_expression(self, value: Any) -> Any:
+        """Return ``clip`` of a column (n,) of SX or MX; what has no bound is left as it is."""
+        lower, upper = (np.broadcast_to(b, value.numel()) for b in (self.lower, self.upper))
+        rows = zip(ca.vertsplit(value), lower, upper, strict=True)
+        raised = ((ca.fmax(v, a) if np.isfinite(a) else v, b) for v, a, b in rows)
+        return ca.vertcat(*(ca.fmin(v, b) if np.isfinite(b) else v for v, b in raised))
+
+    def excess(self, value: np.ndarray) -> np.ndarray:
+        """Return by how much each component lies outside: 0 inside, inf where it is no number."""
+        outside = np.maximum(
+            0.0, np.maximum(np.subtract(self.lower, value), np.subtract(value, self.upper))
+        )
+        return np.where(np.isnan(outside), np.inf, outside)
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """``lower <= expression <= upper`` at a place of the trajectory.
+
+    Args:
+        name: what a message calls it.
+        expression: column (m,) in x, u, t and parameters; no u unless ``at="path"``.
+        lower: number or (m,); equal to ``upper`` for an equation.
+        upper: number or (m,).
+        at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
+            manifold, and ``x0`` a guess) or ``"terminal"``.
+
+    Raises:
+        ProblemError: naming the constraint and what is wrong with place, expression or bounds.
+    """
+
+    name: str
+    expression: ca.SX
+    lower: ArrayLike = -np.inf
+    upper: ArrayLike = np.inf
+    at: Place = "path"
+
+    def __post_init__(self) -> None:
+        """Stack the expression and size the bounds."""
+        check_instance(self.name, str, "the name of a constraint")
+        check_place(self.at, f"constraint '{self.name}': at")
+        expression = check_column(self.expression, f"constraint '{self.name}'")
+        for row in ca.vertsplit(expression):
+            if row.op() in _RELATIONS:
+                raise ProblemError(
+                    f"constraint '{self.name}': {row} is true or false, not a value between "
+                    "bounds; write Constraint(name, expression, lower, upper)"
+                )
+        box = Box(self.lower, self.upper).sized(expression.numel(), f"constraint '{self.name}'")
+        object.__setattr__(self, "expression", expression)
+        object.__setattr__(self, "lower", box.lower)
+        object.__setattr__(self, "upper", box.upper)
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return self.expression.numel()
+
+    @property
+    def box(self) -> Box:
+        """The bounds, each (size,)."""
+        return Box(self.lower, self.upper)
+
+    @property
+    def is_equation(self) -> bool:
+        """Whether every row is an equation."""
+        return bool(np.all(np.asarray(self.lower) == np.asarray(self.upper)))
+
+
+def stacked_box(constraints: tuple[Constraint, ...]) -> Box:
+    """Return the bounds of several constraints as one box."""
+    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
+    upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
+    return Box(lower, upper)

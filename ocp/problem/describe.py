@@ -1,0 +1,79 @@
+"""A problem in mathematics, as text for a person."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from ocp.checks.expressions import element_names, readable
+from ocp.problem.constraint import Box, Constraint
+
+if TYPE_CHECKING:
+    from ocp.problem.ocp import OCP
+
+
+def describe(ocp: "OCP") -> str:
+    """Return the problem as it would stand in a paper."""
+    return "\n".join(["", *_lines(ocp)]).lstrip("\n")
+
+
+def _lines(ocp: "OCP") -> Iterable[str]:
+    m = ocp.model
+    discrete = m.is_discrete
+    tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
+    yield f"{ocp.name}   ({m.name}: {_count(m.nx, 'state')}, {_count(m.nu, 'control')})"
+    yield ""
+    stage = f"sum k=0..{ocp.steps - 1} of L" if ocp.steps is not None else f"int 0..{tf} L dt"
+    yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
+    yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
+    yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"
+    yield "  subject to"
+    for name, row in zip(m.x_names, ca.vertsplit(m.f), strict=True):
+        left = f"{name}[k+1]" if discrete else f"d({name})/dt"
+        yield f"    {left} = {readable(row)}"
+    if ocp.has_free_time:
+        box = ocp.time_box
+        yield f"    {_between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"
+    yield f"    x(0) = {_vector(ocp.x0)}" + ("   (guess)" if ocp.has_free_start else "")
+    yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
+    yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
+    for c in ocp.constraints:
+        yield from _constraint(c, c.at)
+    for c in ocp.invariants:
+        yield from _constraint(c, "kept by the dynamics")
+    for entry in ocp.parameters:
+        symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
+        yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def _bounds(box: Box, names: tuple[str, ...], units: tuple[str, ...]) -> Iterable[str]:
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    for i, name in enumerate(names):
+        if np.isfinite(lower[i]) or np.isfinite(upper[i]):
+            yield f"    {_between(lower[i], name, upper[i])}" + (f" {units[i]}" if units else "")
+
+
+def _constraint(c: Constraint, where: str) -> Iterable[str]:
+    lower, upper = np.asarray(c.lower), np.asarray(c.upper)
+    for i, row in enumerate(ca.vertsplit(c.expression)):
+        yield f"    {_between(lower[i], readable(row), upper[i])}   ({c.name}, {where})"
+
+
+def _between(lower: float, middle: str, upper: float) -> str:
+    if lower == upper:
+        return f"{middle} = {lower:g}"
+    left = f"{lower:g} <= " if np.isfinite(lower) else ""
+    right = f" <= {upper:g}" if np.isfinite(upper) else ""
+    return f"{left}{middle}{right}"
+
+
+def _vector(values: object) -> str:
+    array = np.asarray(values, dtype=float)
+    if array.size > 8:
+        return f"samples of shape {array.shape}"
+    return "(" + ", ".join(f"{v:g}" for v in array.ravel()) + ")"

@@ -1,0 +1,82 @@
+"""A problem as CasADi Functions: numbers in, numbers out."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+
+from ocp.problem.constraint import Constraint
+
+if TYPE_CHECKING:
+    from ocp.problem.ocp import OCP
+
+
+@dataclass(frozen=True, eq=False)
+class Functions:
+    """Everything a problem says, as Functions of (x, u, t, p) or, at the ends, of (x, t, p).
+
+    They take symbols as well as numbers, to build from; to call one again and again with arrays,
+    see ``BufferedFunction``.
+
+    Attributes:
+        rate: f (nx,).
+        running_cost: L.
+        terminal_cost: phi.
+        terminal_gradient: phi_x (nx,).
+        terminal_slopes: phi_t, psi_x (m, nx) and psi_t (m,).
+        path: path constraints, stacked.
+        initial: initial constraints c, stacked.
+        initial_slope: c_x (m, nx).
+        terminal: terminal constraints psi, stacked.
+        invariants: invariants, stacked; of (x, t, p).
+    """
+
+    rate: ca.Function
+    running_cost: ca.Function
+    terminal_cost: ca.Function
+    terminal_gradient: ca.Function
+    terminal_slopes: ca.Function
+    path: ca.Function
+    initial: ca.Function
+    initial_slope: ca.Function
+    terminal: ca.Function
+    invariants: ca.Function
+
+    @property
+    def path_on_control(self) -> np.ndarray:
+        """Which path constraints depend on the control, bool (m,)."""
+        structure = np.array(ca.DM(self.path.jac_sparsity(0, 1), 1.0))
+        return structure.sum(axis=1) > 0.0
+
+    @classmethod
+    def of(cls, ocp: "OCP") -> "Functions":
+        """Build them."""
+        m, p, phi = ocp.model, ocp.p, ca.SX(ocp.terminal_cost)
+
+        def along(name: str, expression: ca.SX) -> ca.Function:
+            return ca.Function(name, [m.x, m.u, m.t, p], [expression], ["x", "u", "t", "p"], [name])
+
+        def at_an_end(name: str, *expressions: ca.SX) -> ca.Function:
+            return ca.Function(name, [m.x, m.t, p], [ca.densify(e) for e in expressions])
+
+        c, psi = stacked(ocp.at("initial")), stacked(ocp.at("terminal"))
+        slopes = (ca.gradient(phi, m.t), ca.jacobian(psi, m.x), ca.jacobian(psi, m.t))
+        return cls(
+            rate=along("rate", m.f),
+            running_cost=along("running_cost", ca.SX(ocp.running_cost)),
+            terminal_cost=at_an_end("terminal_cost", phi),
+            terminal_gradient=at_an_end("terminal_gradient", ca.gradient(phi, m.x)),
+            terminal_slopes=at_an_end("terminal_slopes", *slopes),
+            path=along("path", stacked(ocp.at("path"))),
+            initial=at_an_end("initial", c),
+            initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
+            terminal=at_an_end("terminal", psi),
+            invariants=at_an_end("invariants", stacked(ocp.invariants)),
+        )
+
+
+def stacked(constraints: Iterable[Constraint]) -> ca.SX:
+    """Return the expressions of several constraints as one column."""
+    return ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])

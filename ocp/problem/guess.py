@@ -1,0 +1,55 @@
+"""Where a solver starts: any part of a trajectory, from anywhere."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_numeric, check_positive
+from ocp.checks.errors import ProblemError
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Guess:
+    """A first guess; every part may be left out.
+
+    A part is one row (n,), held over the whole horizon, or (N + 1, n) equally spaced
+    samples, interpolated linearly.
+
+    Args:
+        x: states.
+        u: controls.
+        costate: costates dJ*/dx; one row is the plain psi(t0) of the thesis (3.50).
+        duration: final time minus t0 [s], where it is free.
+    """
+
+    x: ArrayLike | None = None
+    u: ArrayLike | None = None
+    costate: ArrayLike | None = None
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the duration; the shapes are checked where they are known."""
+        if self.duration is not None:
+            check_positive(self.duration, "guess: duration")
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        """Return one part at fractions of the horizon, (len(fractions), width), or None.
+
+        Raises:
+            ProblemError: naming the part whose shape is wrong or which is not finite.
+        """
+        value = getattr(self, part)
+        if value is None:
+            return None
+        rows = np.atleast_2d(check_numeric(value, f"guess: {part}"))
+        if rows.ndim != 2 or rows.shape[1] != width:
+            raise ProblemError(
+                f"guess: {part} has shape {rows.shape}, ({width},) or (N + 1, {width}) is needed"
+            )
+        if not np.isfinite(rows).all():
+            raise ProblemError(f"guess: {part} is not finite")
+        if len(rows) == 1:
+            return np.repeat(rows, len(fractions), axis=0)
+        nodes = np.linspace(0.0, 1.0, len(rows))
+        return np.stack([np.interp(fractions, nodes, c) for c in rows.T], axis=1)

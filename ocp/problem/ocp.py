@@ -1,0 +1,310 @@
+"""The optimal control problem in Bolza form, written once for every solver."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_instance, check_numbers, check_positive
+from ocp.checks.errors import ProblemError
+from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
+from ocp.problem.constraint import Box, Constraint, Place, check_place
+from ocp.problem.describe import describe
+from ocp.problem.functions import Functions
+from ocp.problem.guess import Guess
+from ocp.problem.model import Model
+from ocp.problem.parameters import Parameter, ParameterValues, Signal
+
+# A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class FreeTime:
+    """A final time the optimiser chooses.
+
+    Args:
+        guess: first guess of the duration [s].
+        lower: shortest duration [s]; keep it positive.
+        upper: longest duration [s].
+    """
+
+    guess: float
+    lower: float = 1e-3
+    upper: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Check the three durations and their order."""
+        check_positive(self.guess, "free final time: guess")
+        check_positive(self.lower, "free final time: lower")
+        check_positive(self.upper, "free final time: upper", finite=False)
+        if not self.lower <= self.guess <= self.upper:
+            raise ProblemError(
+                f"free final time: 0 < lower <= guess <= upper is needed, "
+                f"not {self.lower}, {self.guess}, {self.upper} [s]"
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OCP:
+    r"""An optimal control problem in Bolza form.
+
+    .. math::
+
+        \min \; \varphi(x(t_f), t_f) + \int_{t_0}^{t_f} L(x, u, t)\, dt
+        \quad \text{s.t.} \quad \dot x = f(x, u, t), \; x(t_0) = x_0, \; \dots
+
+    With a discrete-time model the integral is the sum of L over the steps (not multiplied
+    by dt). Source: thesis (1.5) to (1.9); notation of [Bryson & Ho 1975].
+
+    Args:
+        name: what people call it.
+        model: the dynamics.
+        x0: start (nx,); with an ``"initial"`` constraint only a guess of it.
+        horizon: duration [s], ``FreeTime``, or a number of steps for a discrete-time model.
+        running_cost: L(x, u, t, parameters).
+        terminal_cost: phi(x, t, parameters).
+        control_bounds: box around the controls.
+        state_bounds: box around the states.
+        constraints: path, initial and terminal constraints.
+        invariants: what the exact dynamics keep by themselves (the task error of a redundant
+            arm, an energy, the norm of a quaternion). No method has to impose them; the
+            referee reports how far a solution strays.
+        parameters: constants and sampled signals that may change from run to run.
+        smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
+        guess: where solvers start unless told otherwise.
+
+    Raises:
+        ProblemError: naming symbol, shape and place of what is wrong.
+    """
+
+    name: str
+    model: Model
+    x0: ArrayLike
+    horizon: float | int | FreeTime
+    running_cost: ca.SX | float = 0.0
+    terminal_cost: ca.SX | float = 0.0
+    control_bounds: Box = field(default_factory=Box)
+    state_bounds: Box = field(default_factory=Box)
+    constraints: tuple[Constraint, ...] = ()
+    invariants: tuple[Constraint, ...] = ()
+    parameters: tuple[Parameter | Signal, ...] = ()
+    smoothness: Literal[0, 1, 2] = 2
+    guess: Guess | None = None
+
+    def __post_init__(self) -> None:
+        """Check every shape, symbol and number, and stack what was given loosely."""
+        self._check_kinds()
+        model = self.model
+        set_ = object.__setattr__
+        set_(self, "x0", check_numbers(self.x0, model.nx, f"{self.name}: x0"))
+        set_(self, "running_cost", check_scalar(self.running_cost, f"{self.name}: running_cost"))
+        set_(self, "terminal_cost", check_scalar(self.terminal_cost, f"{self.name}: terminal_cost"))
+        set_(
+            self,
+            "control_bounds",
+            self.control_bounds.sized(model.nu, f"{self.name}: control_bounds"),
+        )
+        set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
+        self._check_names()
+        self._check_horizon()
+        self._check_symbols()
+        self._check_start()
+
+    # -- what it is ---------------------------------------------------------------
+
+    @property
+    def p(self) -> ca.SX:
+        """All parameter and signal symbols, stacked (n_p,)."""
+        return ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.parameters])
+
+    @property
+    def has_free_time(self) -> bool:
+        """Whether the final time is an unknown."""
+        return isinstance(self.horizon, FreeTime)
+
+    @property
+    def has_free_start(self) -> bool:
+        """Whether the start is only required to lie on a manifold."""
+        return any(c.at == "initial" for c in self.constraints)
+
+    @property
+    def duration(self) -> float:
+        """Final time minus t0 [s]; where it is free, its guess."""
+        if isinstance(self.horizon, FreeTime):
+            return self.horizon.guess
+        return float(self.horizon) * (self.model.dt or 1.0)
+
+    @property
+    def time_box(self) -> Box:
+        """Bounds of the duration [s]; a fixed one has equal bounds."""
+        if isinstance(self.horizon, FreeTime):
+            return Box([self.horizon.lower], [self.horizon.upper])
+        return Box([self.duration], [self.duration])
+
+    @property
+    def steps(self) -> int | None:
+        """Number of steps of a discrete-time problem, else None."""
+        if isinstance(self.horizon, FreeTime) or not self.model.is_discrete:
+            return None
+        return int(self.horizon)
+
+    def at(self, place: Place) -> tuple[Constraint, ...]:
+        """Return the constraints of one place."""
+        check_place(place, f"{self.name}: the place of constraints")
+        return tuple(c for c in self.constraints if c.at == place)
+
+    @cached_property
+    def functions(self) -> Functions:
+        """Dynamics, costs and constraints as CasADi Functions, built at first use."""
+        return Functions.of(self)
+
+    def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
+        """Return the numbers of a run: the declared ones, replaced by those ``given``."""
+        return self._values(given) if given else self._declared
+
+    @cached_property
+    def _declared(self) -> ParameterValues:
+        return self._values({})
+
+    def _values(self, given: Mapping[str, ArrayLike]) -> ParameterValues:
+        values = ParameterValues.of(self.parameters, given)
+        for entry, value in zip(values.entries, values.values, strict=True):
+            if isinstance(entry, Signal) and self.steps and len(value) != self.steps + 1:
+                raise ProblemError(
+                    f"signal '{entry.name}' has {len(value)} samples; a discrete-time problem of "
+                    f"{self.steps} steps needs {self.steps + 1}"
+                )
+        return values
+
+    def start(self, x0: ArrayLike | None = None) -> np.ndarray:
+        """Return the start of a run (nx,), checked; the declared one unless given.
+
+        A start that is given may lie outside the state bounds: it is what it is, such as a
+        measured state, and no solver can change it. What that means the solution says.
+        """
+        return check_numbers(self.x0 if x0 is None else x0, self.model.nx, f"{self.name}: x0")
+
+    def first_guess(self, given: Any = None) -> Any:
+        """Return where a run starts, checked: what is given, else the problem's guess, or None.
+
+        Raises:
+            ProblemError: if it is nothing that can be sampled.
+        """
+        guess = self.guess if given is None else given
+        # A class has the method as well, but nothing to call it with.
+        if guess is not None and (isinstance(guess, type) or not hasattr(guess, "sample")):
+            raise ProblemError(
+                f"{self.name}: the guess is {guess if isinstance(guess, type) else type(guess)}, "
+                "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
+            )
+        return guess
+
+    def describe(self) -> str:
+        """Return the problem in mathematics, for a person."""
+        return describe(self)
+
+    # -- checks at construction -----------------------------------------------------
+
+    def _check_kinds(self) -> None:
+        check_instance(self.name, str, "the name of a problem")
+        check_instance(self.model, Model, f"{self.name}: model")
+        check_instance(self.control_bounds, Box, f"{self.name}: control_bounds")
+        check_instance(self.state_bounds, Box, f"{self.name}: state_bounds")
+        self.first_guess()
+        for what, kind in (
+            ("constraints", Constraint),
+            ("invariants", Constraint),
+            ("parameters", (Parameter, Signal)),
+        ):
+            entries = getattr(self, what)
+            check_instance(entries, (tuple, list), f"{self.name}: {what}")
+            for entry in entries:
+                check_instance(entry, kind, f"{self.name}: an entry of {what}")
+            object.__setattr__(self, what, tuple(entries))
+
+    def _check_names(self) -> None:
+        for kind, entries in (
+            ("constraint", (*self.constraints, *self.invariants)),
+            ("parameter", self.parameters),
+        ):
+            names = [entry.name for entry in entries]
+            twice = sorted({n for n in names if names.count(n) > 1})
+            if twice:
+                raise ProblemError(f"{self.name}: two {kind}s are called '{twice[0]}'")
+
+    def _check_horizon(self) -> None:
+        if not isinstance(self.smoothness, int) or self.smoothness not in (0, 1, 2):
+            raise ProblemError(f"{self.name}: smoothness = {self.smoothness!r}, it is 0, 1 or 2")
+        if isinstance(self.horizon, FreeTime):
+            if self.model.is_discrete:
+                raise ProblemError(f"{self.name}: a discrete-time model has no free final time")
+            return
+        check_positive(self.horizon, f"{self.name}: horizon")
+        if self.model.is_discrete and not isinstance(self.horizon, int | np.integer):
+            raise ProblemError(
+                f"{self.name}: horizon = {self.horizon} of a discrete-time model: it is "
+                "a number of steps, a whole one, and no duration"
+            )
+
+    def _check_symbols(self) -> None:
+        model, p = self.model, self.p
+        declared = element_names(ca.vertcat(model.x, model.u, model.t, p))
+        hashes = {e.element_hash() for e in ca.vertsplit(ca.vertcat(model.x, model.u, model.t, p))}
+        if len(hashes) < len(declared):
+            raise ProblemError(
+                f"{self.name}: a symbol is declared twice among x, u, t and parameters"
+            )
+        model.refuse_foreign_symbols(p)
+        everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
+        refuse_foreign_symbols(ca.SX(self.running_cost), everywhere, f"{self.name}: running_cost")
+        refuse_foreign_symbols(ca.SX(self.terminal_cost), at_ends, f"{self.name}: terminal_cost")
+        for c in self.constraints:
+            allowed = everywhere if c.at == "path" else at_ends
+            refuse_foreign_symbols(
+                c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'"
+            )
+        for c in self.invariants:
+            refuse_foreign_symbols(c.expression, at_ends, f"{self.name}: invariant '{c.name}'")
+            if c.at != "path":
+                raise ProblemError(f"{self.name}: invariant '{c.name}' must hold at='path'")
+
+    def _check_start(self) -> None:
+        """Evaluate everything once at the start: NaN in data or a singular start shows here."""
+        model, x0 = self.model, self.start()
+        self._check_start_bounds(x0)
+        if self.guess is not None:
+            for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
+                self.guess.sample(part, np.array([0.0]), width)
+        p = self.parameter_values().at(0.0)[0]
+        u = self.control_bounds.clip(np.zeros(model.nu))
+        functions = self.functions
+        for what, value in (
+            ("dynamics f", functions.rate(x0, u, 0.0, p)),
+            ("running_cost", functions.running_cost(x0, u, 0.0, p)),
+            ("terminal_cost", functions.terminal_cost(x0, 0.0, p)),
+            ("constraints", functions.path(x0, u, 0.0, p)),
+        ):
+            row = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
+            if row.size:
+                raise ProblemError(
+                    f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {x0}, u = {u}: "
+                    "a singular start, or NaN in the data"
+                )
+
+    def _check_start_bounds(self, x0: np.ndarray) -> None:
+        excess = self.state_bounds.excess(x0)
+        outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(x0)))
+        if outside.size and not self.has_free_start:
+            i = int(outside[0])
+            low, high = (
+                np.asarray(b)[i] for b in (self.state_bounds.lower, self.state_bounds.upper)
+            )
+            raise ProblemError(
+                f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {x0[i]} is outside "
+                f"its bounds [{low}, {high}]"
+            )

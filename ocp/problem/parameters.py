@@ -1,0 +1,185 @@
+"""What is known only at run time: constant parameters and sampled signals."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_instance, check_numbers, check_numeric
+from ocp.checks.errors import ProblemError
+from ocp.checks.expressions import check_symbols
+
+# Two grids whose nodes differ by rounding must be taken as the same grid.
+_SAME_NODE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """A constant of the problem whose value may change from run to run.
+
+    Args:
+        name: the key under which ``run(parameters=...)`` takes another value.
+        symbol: ``SX`` column (m,).
+        value: the value (m,) unless a run says otherwise.
+    """
+
+    name: str
+    symbol: ca.SX
+    value: ArrayLike
+
+    def __post_init__(self) -> None:
+        """Check symbol and value."""
+        check_symbols(self.symbol, f"parameter '{self.name}'")
+        object.__setattr__(self, "value", self.checked(self.value))
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Instants in [0, 1] between which the value is smooth."""
+        return np.array([0.0, 1.0])
+
+    def checked(self, value: ArrayLike) -> np.ndarray:
+        """Return ``value`` as (m,), or raise ``ProblemError``."""
+        return check_numbers(value, self.symbol.numel(), f"parameter '{self.name}'")
+
+    def at(self, value: np.ndarray, fraction: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
+        """Return the value at each fraction of the horizon, (len(fraction), m)."""
+        return np.tile(value, (len(fraction), 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A reference sampled over the horizon, at N + 1 equally spaced instants.
+
+    Args:
+        name: the key under which ``run(parameters=...)`` takes other samples.
+        symbol: ``SX`` column (m,).
+        samples: (N + 1, m), first at t0, last at the final time.
+        hold: ``"held"``: constant from one sample to the next; ``"linear"``: interpolated.
+    """
+
+    name: str
+    symbol: ca.SX
+    samples: ArrayLike
+    hold: Literal["held", "linear"] = "held"
+
+    def __post_init__(self) -> None:
+        """Check symbol and samples."""
+        check_symbols(self.symbol, f"signal '{self.name}'")
+        if self.hold not in ("held", "linear"):
+            raise ProblemError(
+                f"signal '{self.name}': hold = {self.hold!r} is neither held nor linear"
+            )
+        object.__setattr__(self, "samples", self.checked(self.samples))
+
+    @property
+    def value(self) -> np.ndarray:
+        """The samples, (N + 1, m)."""
+        return np.asarray(self.samples)
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Instants in [0, 1] between which the signal is smooth."""
+        return np.linspace(0.0, 1.0, len(self.value))
+
+    def checked(self, samples: ArrayLike) -> np.ndarray:
+        """Return ``samples`` as (N + 1, m), or raise ``ProblemError``."""
+        values = check_numeric(samples, f"signal '{self.name}'")
+        values = values[:, None] if values.ndim == 1 else values
+        width = self.symbol.numel()
+        if values.ndim != 2 or values.shape[1] != width or len(values) < 2:
+            raise ProblemError(
+                f"signal '{self.name}': samples have shape {values.shape}, "
+                f"(N + 1, {width}) is needed"
+            )
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+            raise ProblemError(f"signal '{self.name}': sample {row} is not finite: {values[row]}")
+        values.flags.writeable = False
+        return values
+
+    def at(self, samples: np.ndarray, fraction: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
+        """Return the signal at each fraction of the horizon, (len(fraction), m).
+
+        ``side`` says which one-sided limit is meant where a held signal jumps.
+        """
+        last = len(samples) - 1
+        position = np.asarray(fraction) * last
+        if self.hold == "linear":
+            columns = [np.interp(position, np.arange(last + 1), c) for c in samples.T]
+            return np.stack(columns, axis=1)
+        if side > 0:
+            index = np.floor(position + _SAME_NODE).astype(int)
+        else:
+            index = np.ceil(position - _SAME_NODE).astype(int) - 1
+        return samples[np.clip(index, 0, last)]
+
+
+@dataclass(frozen=True)
+class ParameterValues:
+    """The numbers of one run, ready to be sampled on any grid.
+
+    Attributes:
+        entries: the parameters and signals of the problem, in its order; n_p components in all.
+        values: their numbers, (size,) for a parameter, (samples, size) for a signal.
+    """
+
+    entries: tuple[Parameter | Signal, ...]
+    values: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(
+        cls, entries: Sequence[Parameter | Signal], given: Mapping[str, ArrayLike] | None
+    ) -> "ParameterValues":
+        """Return the declared values, replaced by those ``given`` by name, all checked."""
+        if given is not None:
+            check_instance(given, Mapping, "parameters (values by name)")
+        given = dict(given or {})
+        values = tuple(np.asarray(e.checked(given.pop(e.name, e.value))) for e in entries)
+        if given:
+            known = ", ".join(e.name for e in entries) or "none"
+            raise ProblemError(f"unknown parameters: {', '.join(given)}; declared are: {known}")
+        return cls(tuple(entries), values)
+
+    def at(self, fraction: ArrayLike, side: Literal[-1, 1] = 1) -> np.ndarray:
+        """Return the stacked parameter vector at fractions of the horizon, (len, n_p)."""
+        if not self.entries:
+            return np.empty((np.size(fraction), 0))
+        points = np.atleast_1d(np.asarray(fraction, dtype=float))
+        blocks = [e.at(v, points, side) for e, v in zip(self.entries, self.values, strict=True)]
+        return np.hstack([np.empty((len(points), 0)), *blocks])
+
+    def samples(self, count: int) -> np.ndarray:
+        """Return the stacked vector where every signal has ``count`` samples, (count, n_p)."""
+        blocks = [
+            v if isinstance(e, Signal) else np.broadcast_to(v, (count, len(v)))
+            for e, v in zip(self.entries, self.values, strict=True)
+        ]
+        return np.hstack(blocks) if blocks else np.empty((count, 0))
+
+    def on(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the values at the left and the right end of each interval, (N, n_p) each.
+
+        In between they are interpolated linearly, which is exact where the knots of the
+        signals are among the nodes of the grid.
+        """
+        return self.at(fractions[:-1], 1), self.at(fractions[1:], -1)
+
+    @property
+    def knots(self) -> np.ndarray:
+        """All fractions of the horizon at which some signal is not smooth."""
+        return np.unique(
+            np.concatenate([[0.0, 1.0], *[self._knots(i) for i in range(len(self.values))]])
+        )
+
+    def _knots(self, i: int) -> np.ndarray:
+        entry = self.entries[i]
+        return (
+            np.linspace(0.0, 1.0, len(self.values[i])) if isinstance(entry, Signal) else entry.knots
+        )
+
+    def as_dict(self) -> dict[str, np.ndarray]:
+        """Return name -> value, as ``run(parameters=...)`` takes it."""
+        return {e.name: v for e, v in zip(self.entries, self.values, strict=True)}

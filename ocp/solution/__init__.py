@@ -1,0 +1,1 @@
+"""What a solver promises, and what it returns."""

@@ -1,0 +1,328 @@
+"""What a solver returns: a trajectory, its costates, and how it was found."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
+
+from ocp.checks.arguments import check_instance
+from ocp.checks.errors import ProblemError, SolverError
+from ocp.minimum_principle.necessary_conditions import minimum_principle
+from ocp.problem.fingerprint import differing_in, fingerprint_entries
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
+from ocp.solution.archive import read_archive, write_archive
+from ocp.solution.piecewise_polynomial import PiecewisePolynomial
+from ocp.solution.status import Status
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ControlKind = Literal["held", "linear", "polynomial", "extremal"]
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a method did, free of the machine it ran on.
+
+    Attributes:
+        rollouts: integrations of the whole trajectory (states, or states and costates).
+        jacobians: evaluations of the first derivatives along the whole trajectory.
+        factorisations: linear systems factorised.
+    """
+
+    rollouts: int = 0
+    jacobians: int = 0
+    factorisations: int = 0
+
+    def __add__(self, other: "Work") -> "Work":
+        """Return the work of both."""
+        return Work(*[getattr(self, f.name) + getattr(other, f.name) for f in fields(self)])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution:
+    """A trajectory with its costates. Arrays are (N + 1, n): one row per instant.
+
+    Attributes:
+        problem: what was solved.
+        solver: the solver, as text.
+        status: how the solve ended.
+        message: what and where, where the status alone does not say it.
+        t: nodes [s], (N + 1,).
+        x: states, (N + 1, nx).
+        x0: the start that was asked for, (nx,); a guess of it where the start is free.
+        costate: dJ*/dx at the nodes, (N + 1, nx); where a state bound is active the costate
+            jumps, and the value just before the node is kept (by collocation just after it).
+        u: controls, (N, nu) where held, else (N + 1, nu); of K polynomials the coefficients,
+            (K m, nu), see ``PiecewisePolynomial``.
+        control_kind: ``"held"`` between nodes, ``"linear"``, ``"polynomial"`` from break to
+            break, or ``"extremal"``: the control minimising the Hamiltonian along state and
+            costate.
+        breaks: which nodes the pieces of a polynomial control meet at, (K + 1,), from 0 to N;
+            empty for the other kinds.
+        cost: what the solver believes; only ``evaluate`` says what it is.
+        residual: the solver's own measure of optimality (its unit is the solver's).
+        iterations: iterations of the outer method.
+        work: integrations, Jacobians and factorisations.
+        history: cost and residual per iteration, as far as the method has them.
+        parameters: parameter values and signals of this run, by name.
+        build_time: time of ``build`` [s].
+        solve_time: time of ``run`` [s].
+    """
+
+    problem: OCP
+    solver: str
+    status: Status
+    message: str = ""
+    t: np.ndarray
+    x: np.ndarray
+    x0: np.ndarray
+    costate: np.ndarray
+    u: np.ndarray
+    control_kind: ControlKind = "held"
+    breaks: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    cost: float
+    residual: float = 0.0
+    iterations: int = 0
+    work: Work = field(default_factory=Work)
+    history: Mapping[str, np.ndarray] = field(default_factory=dict)
+    parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    build_time: float = 0.0
+    solve_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check kinds and shapes, and that no number is NaN."""
+        check_instance(self.problem, OCP, "solution: problem")
+        check_instance(self.status, Status, "solution: status")
+        if self.control_kind not in get_args(ControlKind):
+            known = ", ".join(get_args(ControlKind))
+            raise ProblemError(f"solution: control_kind = {self.control_kind!r} is none of {known}")
+        for name in _ARRAYS:
+            check_instance(getattr(self, name), np.ndarray, f"solution: {name}")
+        n, m = len(self.t), self.problem.model
+        object.__setattr__(self, "breaks", np.asarray(self.breaks, dtype=int))
+        rows = n - 1 if self.control_kind == "held" else n
+        if self.control_kind == "polynomial":
+            rows = self._check_breaks()
+        for name, shape in (
+            ("t", (n,)),
+            ("x", (n, m.nx)),
+            ("x0", (m.nx,)),
+            ("costate", (n, m.nx)),
+            ("u", (rows, m.nu)),
+        ):
+            array = getattr(self, name)
+            if array.shape != shape:
+                raise ProblemError(f"solution: {name} has shape {array.shape}, {shape} is needed")
+            if not np.isfinite(array).all():
+                raise ProblemError(f"solution: {name} is not finite")
+        if n < 2 or not (np.diff(self.t) > 0.0).all():
+            raise ProblemError("solution: t does not increase from node to node")
+        for name in ("cost", "residual"):
+            check_instance(
+                getattr(self, name), (float, int, np.floating, np.integer), f"solution: {name}"
+            )
+            if np.isnan(getattr(self, name)):
+                raise ProblemError(f"solution: {name} is NaN")
+
+    def _check_breaks(self) -> int:
+        """Return how many coefficients there must be: as many as there are, if that fits."""
+        last, breaks = len(self.t) - 1, self.breaks
+        increasing = breaks.ndim == 1 and len(breaks) > 1 and (np.diff(breaks) > 0).all()
+        if not increasing or breaks[0] != 0 or breaks[-1] != last:
+            raise ProblemError(f"solution: breaks = {breaks}, they must increase from 0 to {last}")
+        pieces = len(breaks) - 1
+        return max(1, len(self.u) // pieces) * pieces
+
+    def __repr__(self) -> str:
+        """Return one line: what was solved, how it ended, what the solver believes it costs."""
+        return (
+            f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
+            f"{self.iterations} iterations, {len(self.t) - 1} intervals{self._hint}>"
+        )
+
+    @property
+    def _hint(self) -> str:
+        """Who knows more about a failure."""
+        return "" if self.status.is_success else "; solvers.diagnose(solution) looks for the cause"
+
+    @property
+    def duration(self) -> float:
+        """Final time minus t0 [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """The nodes as fractions of the horizon, from 0 to 1."""
+        return (self.t - self.t[0]) / self.duration
+
+    @property
+    def data(self) -> RunData:
+        """The numbers of the run it comes from."""
+        return RunData(self.x0, float(self.t[0]), self.problem.parameter_values(self.parameters))
+
+    def or_raise(self) -> "Solution":
+        """Return self, or raise ``SolverError`` with the reason if the solve failed."""
+        if not self.status.is_success:
+            said = f"{self.solver}: {self.status.value}. {self.message}".strip()
+            raise SolverError(f"{said}{self._hint}")
+        return self
+
+    def with_(self, **changes: Any) -> "Solution":
+        """Return a copy with some fields replaced."""
+        return replace(self, **changes)
+
+    # -- between the nodes ----------------------------------------------------------
+
+    def state(self, t: ArrayLike) -> np.ndarray:
+        """Return the state at time(s) t [s], (nx,) or (len(t), nx).
+
+        Interpolated linearly; for an extremal by cubics with the slopes of its canonical flow.
+        """
+        if self.control_kind == "extremal":
+            return self._canonical(t)[..., : self.problem.model.nx]
+        return _interpolate(np.asarray(t, dtype=float), self.t, self.x)
+
+    def costate_at(self, t: ArrayLike) -> np.ndarray:
+        """Return the costate at time(s) t [s], interpolated as the state is."""
+        if self.control_kind == "extremal":
+            return self._canonical(t)[..., self.problem.model.nx :]
+        return _interpolate(np.asarray(t, dtype=float), self.t, self.costate)
+
+    def control(self, t: ArrayLike) -> np.ndarray:
+        """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says.
+
+        That of an extremal is accurate to O(h^4), h the distance of the nodes, where the
+        signals of the problem are smooth between them.
+        """
+        times = np.asarray(t, dtype=float)
+        if self.control_kind == "held":
+            index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
+            return self.u[np.clip(index, 0, len(self.u) - 1)]
+        if self.control_kind == "linear":
+            return _interpolate(times, self.t, self.u)
+        if self.control_kind == "polynomial":
+            values = self.pieces.at(np.atleast_1d(times))
+            return values if times.ndim else values[0]
+        points = np.atleast_1d(times)
+        tau = (points - self.t[0]) / self.duration
+        p = self.problem.parameter_values(self.parameters).at(tau)
+        law = minimum_principle(self.problem).control
+        args = (self.state(points), self.costate_at(points), points[:, None], p)
+        values = np.array(law.map(len(points))(*[a.T for a in args])).T
+        return values if times.ndim else values[0]
+
+    @cached_property
+    def pieces(self) -> PiecewisePolynomial:
+        """The polynomials of a control of that kind."""
+        count = len(self.breaks) - 1
+        coefficients = self.u.reshape(count, -1, self.problem.model.nu)
+        return PiecewisePolynomial(self.t[self.breaks], coefficients)
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        """Return x, u or costate at fractions of the horizon: a solution is also a guess."""
+        times = self.t[0] + np.asarray(fractions) * self.duration
+        values = {"x": self.state, "u": self.control, "costate": self.costate_at}[part](times)
+        if values.shape[1] != width:
+            raise ProblemError(
+                f"guess: the solution has {values.shape[1]} of {part}, {width} are needed"
+            )
+        return values
+
+    def _canonical(self, t: ArrayLike) -> np.ndarray:
+        """State and costate of an extremal."""
+        return self._cubics(np.clip(np.asarray(t, dtype=float), self.t[0], self.t[-1]))
+
+    @cached_property
+    def _cubics(self) -> PPoly:
+        """State and costate of an extremal between its nodes; signals may jump at the nodes."""
+        z, steps = np.hstack([self.x, self.costate]), np.diff(self.t)[:, None]
+        flow = minimum_principle(self.problem).flow.map(len(steps))
+        p_start, p_end = self.data.values.on(self.fractions)
+        slope = np.array(flow(z[:-1].T, self.t[None, :-1], p_start.T)).T
+        slope_end = np.array(flow(z[1:].T, self.t[None, 1:], p_end.T)).T
+        secant = np.diff(z, axis=0) / steps
+        square = (3 * secant - 2 * slope - slope_end) / steps
+        cube = (slope + slope_end - 2 * secant) / steps**2
+        return PPoly(np.stack([cube, square, slope, z[:-1]]), self.t)
+
+    # -- to look at, to keep --------------------------------------------------------
+
+    def plot(self) -> "Figure":
+        """Return a figure of states, controls, costates and constraints over time."""
+        from ocp.plotting.solution import (
+            plot_solution,
+        )  # matplotlib takes a second: only who plots waits
+
+        return plot_solution(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write everything to one ``.npz`` file, the problem as its ``probe``; return its path."""
+        content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
+        content |= {
+            f"{group}/{key}": value
+            for group in ("history", "parameters")
+            for key, value in getattr(self, group).items()
+        }
+        content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
+        content |= {"status": self.status.name, "problem": self.problem.name}
+        content |= {"breaks": self.breaks}
+        content |= fingerprint_entries(self.problem)
+        return write_archive(path, "solution", content)
+
+    @classmethod
+    def load(cls, path: str | Path, problem: OCP) -> "Solution":
+        """Read a solution of ``problem`` from a file that ``save`` wrote.
+
+        Raises:
+            ProblemError: if the file belongs to another problem, by its name or by what the
+                problem's functions and bounds are (older files know only the name), or
+                is no solution.
+        """
+        check_instance(problem, OCP, f"the problem that {path} is to be a solution of")
+        needed = {"status", "problem", *_ARRAYS, *_SCALARS}
+        data = read_archive(path, "solution", needed)
+        data.setdefault("breaks", np.empty(0, dtype=int))  # files of before there were any
+        if str(data["problem"]) != problem.name:
+            raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
+        groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}, "probe": {}}
+        for name, value in data.items():
+            group, _, key = name.partition("/")
+            if key:
+                groups[group][key] = value
+        if other := differing_in(data, problem):
+            raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
+        if str(data["status"]) not in Status.__members__:
+            raise ProblemError(f"{path} is no saved solution: its status is '{data['status']}'")
+        return cls(
+            problem=problem,
+            status=Status[str(data["status"])],
+            **{name: data[name] for name in (*_ARRAYS, "breaks")},
+            **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            history=groups["history"],
+            parameters=groups["parameters"],
+            work=Work(**{k: int(v) for k, v in groups["work"].items()}),
+        )
+
+
+_ARRAYS = ("t", "x", "x0", "costate", "u")
+_SCALARS = {
+    "solver": str,
+    "message": str,
+    "control_kind": str,
+    "cost": float,
+    "residual": float,
+    "iterations": int,
+    "build_time": float,
+    "solve_time": float,
+}
+
+
+def _interpolate(t: ArrayLike, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(np.asarray(t, dtype=float), nodes, c) for c in rows.T], axis=-1)

@@ -1,0 +1,97 @@
+"""What every solver promises: build once, run often."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from time import perf_counter
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_instance
+from ocp.problem.ocp import OCP
+from ocp.solution.solution import Solution
+
+
+class InitialGuess(Protocol):
+    """Where a solver may start: a ``Guess``, a ``Solution``, an earlier plan moved in time."""
+
+    @property
+    def duration(self) -> float | None:
+        """Final time minus t0 [s], where it is free."""
+        ...
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        """Return x, u or costate at fractions of the horizon, (len(fractions), width), or None."""
+        ...
+
+
+class Program(ABC):
+    """A problem prepared by a solver: all symbolic work is done.
+
+    Attributes:
+        is_stateful: whether an answer depends on the runs before it, other than by the guess.
+    """
+
+    is_stateful: ClassVar[bool] = False
+
+    @abstractmethod
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: InitialGuess | None = None,
+    ) -> Solution:
+        """Solve for these data.
+
+        Args:
+            x0: start (nx,), a guess of it where the start is free; default: the problem's.
+            t0: initial time [s].
+            parameters: values of parameters and samples of signals that differ from the
+                declared ones, by name.
+            guess: a ``Solution`` of any solver, or a ``Guess``; default: the problem's.
+
+        Returns:
+            a solution whose ``status`` says how it ended; failure is no exception.
+
+        Raises:
+            ProblemError: if the data do not fit the problem.
+        """
+
+
+class Solver(ABC):
+    """A method with its options: a frozen dataclass whose fields are typed."""
+
+    @abstractmethod
+    def build(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem.
+
+        Raises:
+            UnsupportedProblem: naming the term that this method cannot treat.
+        """
+
+
+def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
+    """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
+
+    Args:
+        ocp: the problem.
+        solver: the method with its options.
+        guess: where to start; without one the problem's own guess, else the method's default.
+
+    Returns:
+        the solution, whatever its status; ``or_raise()`` insists on success.
+
+    Raises:
+        UnsupportedProblem: where the method cannot treat the problem, naming the term.
+        ProblemError: if an argument is of another kind, or the guess does not fit.
+    """
+    check_instance(ocp, OCP, "solve: ocp")
+    check_instance(solver, Solver, "solve: solver")
+    ocp.first_guess(guess)
+    start = perf_counter()
+    program = solver.build(ocp)
+    build_time = perf_counter() - start
+    return program.run(guess=guess).with_(build_time=build_time)

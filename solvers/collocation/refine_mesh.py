@@ -1,0 +1,165 @@
+"""Collocation on a mesh that is refined until the dynamics are met between the points."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+from time import perf_counter
+
+import numpy as np
+
+from ocp import Solution, Status, Work
+from ocp.internal import check_instance, check_positive, check_whole
+from solvers.collocation.collocation import Collocation
+from solvers.collocation.collocation_points import HIGHEST, LOWEST
+from solvers.collocation.mesh import Mesh
+
+# One more degree has to divide the error of an interval by this, or the interval is split.
+_PAYS = 5.0
+# Into how many parts at most an interval is split at once.
+_MOST_PARTS = 4
+# Intervals shorter than this fraction of the horizon are left as they are.
+_SHORTEST = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class MeshRound:
+    """One mesh and what came of it.
+
+    Attributes:
+        mesh: the mesh.
+        errors: of each interval: by how much the dynamics, integrated from node to node, miss
+            the polynomial, relative to 1 + abs(x), or the running cost its quadrature, relative
+            to 1 + abs(cost), (K,).
+        cost: what the solver believes.
+        status: how the solve ended.
+    """
+
+    mesh: Mesh
+    errors: np.ndarray
+    cost: float
+    status: Status
+
+    @property
+    def error(self) -> float:
+        """The largest error of any interval."""
+        return float(self.errors.max())
+
+
+@dataclass(frozen=True, eq=False)
+class MeshRefinement:
+    """A refined solution and how it came about.
+
+    Attributes:
+        solution: on the last mesh, successful where every interval meets the accuracy; work,
+            iterations and times are those of all rounds.
+        rounds: the meshes, in order.
+    """
+
+    solution: Solution
+    rounds: tuple[MeshRound, ...]
+
+
+def refine_mesh(
+    start: Solution,
+    *,
+    solver: Collocation | None = None,
+    accuracy: float = 1e-8,
+    rounds: int = 15,
+) -> MeshRefinement:
+    """Collocate again and again, on finer intervals or with higher degrees where it is needed.
+
+    In every round dynamics and running cost are integrated from node to node under the
+    solution's own controls.
+    An interval whose error exceeds the accuracy gets one degree more, up to 5, as long as that
+    pays (the error falls to a fifth: the solution is smooth there); otherwise it is split, in as
+    many parts as its order makes necessary, 2 to 4. Nothing is ever coarsened, no number is
+    drawn. The idea is that of [Patterson, Hager & Rao 2015].
+
+    It sees what dynamics and running cost see. A kink of the control that both integrate
+    exactly, such as the switch of a double integrator in minimum time, leaves no error and is
+    not refined; neither is a control that is merely not optimal between the points, or
+    violates a constraint there. ``evaluate`` shows all three.
+
+    Args:
+        start: a solution of any solver: the problem, its data, and the first guess.
+        solver: points, options, and the first mesh; default ``Collocation(intervals=10)``.
+        accuracy: accepted error of an interval, see ``Round``.
+        rounds: meshes at most; ``INACCURATE`` if the last is still not fine enough.
+
+    Returns:
+        the last solution and all meshes. A round that fails ends it, with its reason.
+
+    Raises:
+        ProblemError: if an option is wrong.
+        UnsupportedProblem: for a discrete-time model.
+    """
+    check_whole(rounds, "refine_mesh: rounds")
+    check_positive(accuracy, "refine_mesh: accuracy")
+    check_instance(start, Solution, "refine_mesh: start")
+    solver = solver or Collocation(intervals=10)
+    check_instance(solver, Collocation, "refine_mesh: solver")
+    cells = _Cells.of(solver.chosen_mesh)
+    solution, done, made, work, iterations = start, [], 0.0, Work(), 0
+    solve_time = 0.0
+    for _ in range(rounds):
+        begun = perf_counter()
+        program = replace(solver, mesh=cells.mesh, accuracy=np.inf).build(start.problem)
+        made += perf_counter() - begun
+        data = start.data
+        solution = program.run(x0=data.x0, t0=data.t0, parameters=start.parameters, guess=solution)
+        errors = program.gaps.errors(solution)
+        done.append(MeshRound(cells.mesh, errors, solution.cost, solution.status))
+        work, iterations = work + solution.work, iterations + solution.iterations
+        solve_time += solution.solve_time
+        if not solution.status.is_success or done[-1].error <= accuracy:
+            break
+        cells = cells.finer(errors, accuracy)
+    last = done[-1]
+    if solution.status.is_success and not last.error <= accuracy:
+        reason = f"an interval is still wrong by {last.error:.2g} after {len(done)} meshes"
+        solution = solution.with_(status=Status.INACCURATE, message=reason)
+    totals = {"work": work, "iterations": iterations, "solve_time": solve_time}
+    return MeshRefinement(solution.with_(build_time=made, **totals), tuple(done))
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """A mesh that remembers what its last raises of a degree were worth.
+
+    Attributes:
+        mesh: the mesh.
+        before: error of each interval when it had one degree less; None where it was not raised.
+    """
+
+    mesh: Mesh
+    before: tuple[float | None, ...]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> "_Cells":
+        return cls(mesh, (None,) * mesh.intervals)
+
+    def finer(self, errors: np.ndarray, accuracy: float) -> "_Cells":
+        """Return the next mesh."""
+        edges, degrees, before = [0.0], [], []
+        ends = zip(self.mesh.edges, self.mesh.edges[1:], strict=False)
+        for (left, right), degree, error, was in zip(
+            ends, self.mesh.degrees, errors.tolist(), self.before, strict=True
+        ):
+            parts, new = 1, degree
+            smooth = was is None or was >= _PAYS * error
+            needed = not error <= accuracy and right - left > _SHORTEST
+            if needed and smooth and degree < HIGHEST:
+                new = degree + 1
+            elif needed:
+                parts = _parts(error / accuracy, degree)
+                new = degree if smooth else max(LOWEST, degree - 1)
+            edges += np.linspace(left, right, parts + 1)[1:].tolist()
+            degrees += [new] * parts
+            before += [error if new > degree else None] * parts
+        return _Cells(Mesh(tuple(edges), tuple(degrees)), tuple(before))
+
+
+def _parts(excess: float, degree: int) -> int:
+    """Return how many parts divide an error of order degree + 1 by enough."""
+    if not np.isfinite(excess):
+        return _MOST_PARTS
+    return int(np.clip(ceil(excess ** (1.0 / (degree + 1))), 2, _MOST_PARTS))

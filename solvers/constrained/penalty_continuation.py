@@ -1,0 +1,110 @@
+"""The loop that thesis 3.3 sketches: raise the price of a collision until nobody pays it."""
+
+from typing import Literal
+
+import numpy as np
+
+from ocp import (
+    OCP,
+    Evaluation,
+    InitialGuess,
+    ProblemError,
+    Solution,
+    Solver,
+    Status,
+    Work,
+    evaluate,
+)
+from ocp.internal import check_instance, check_positive, check_whole
+
+
+def penalty_continuation(
+    soft: OCP,
+    hard: OCP,
+    solver: Solver,
+    *,
+    parameter: str,
+    factor: float = 2.0,
+    tolerance: float = 1e-6,
+    most: int = 30,
+    guess: InitialGuess | None = None,
+) -> Solution:
+    """Solve a soft problem again and again, its price raised until a hard one is kept.
+
+    The program is built once. Every run starts from the same guess: from a motion through the
+    obstacle a higher price leads to another one through it. Clear is what the *referee* finds
+    clear, between the nodes too. The price buys distance, so the answer costs
+    more than the optimum of the hard problem; ``AugmentedLagrangian`` finds that one.
+    Source: thesis 3.3, the penalty method [Nocedal & Wright 2006, 17.1].
+
+    Args:
+        soft: the problem with a bounded cost of collision.
+        hard: the same dynamics with the constraint that is to be kept.
+        solver: of the soft problem.
+        parameter: of the soft problem, a number that multiplies that cost.
+        factor: by which it is raised.
+        tolerance: on the violation of ``hard``.
+        most: runs.
+        guess: where every run starts.
+
+    Returns:
+        the last answer, as a solution of ``soft``; the price is in ``parameters``, and the
+        violation of ``hard`` after every run in ``history["violation"]``. The status is the
+        solver's where the answer is clear, ``INFEASIBLE`` where even the last price was paid,
+        the solver's own failure where it failed.
+
+    Raises:
+        ProblemError: if the problems do not fit, or the parameter is none or not positive.
+    """
+    check_instance(soft, OCP, "raise until clear: soft")
+    check_instance(hard, OCP, "raise until clear: hard")
+    check_instance(solver, Solver, "raise until clear: solver")
+    check_whole(most, "raise until clear: most")
+    price = _first_price(soft, parameter)
+    if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
+        raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
+    check_positive(tolerance, "raise until clear: tolerance")
+    if not (price > 0.0).all():
+        raise ProblemError(
+            f"raise until clear: '{parameter}' = {price}, it must be positive to be raised"
+        )
+    program = solver.build(soft)
+    runs: list[Solution] = []
+    verdicts: list[Evaluation] = []
+    while len(runs) < most:
+        run = program.run(parameters={parameter: price}, guess=guess)
+        runs.append(run)
+        verdicts.append(evaluate(run.with_(problem=hard, parameters={}, control_kind=_kind(run))))
+        if not run.status.is_success or verdicts[-1].violation <= tolerance:
+            break
+        price = factor * price
+    return _summed(runs, verdicts, tolerance)
+
+
+def _first_price(soft: OCP, parameter: str) -> np.ndarray:
+    known = {entry.name: entry for entry in soft.parameters}
+    if parameter not in known:
+        raise ProblemError(f"{soft.name} has no parameter '{parameter}'")
+    return np.asarray(known[parameter].value, dtype=float)
+
+
+def _summed(runs: list[Solution], verdicts: list[Evaluation], tolerance: float) -> Solution:
+    """Return the last run with the work of all; not clear at the last price is infeasible."""
+    last, verdict = runs[-1], verdicts[-1]
+    status, message = last.status, last.message
+    if status.is_success and verdict.violation > tolerance:
+        status = Status.INFEASIBLE
+        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at any price"
+    return last.with_(
+        status=status,
+        message=message,
+        iterations=sum(run.iterations for run in runs),
+        work=sum((run.work for run in runs), Work()),
+        history={**last.history, "violation": np.array([v.violation for v in verdicts])},
+        solve_time=sum(run.solve_time for run in runs),
+    )
+
+
+def _kind(run: Solution) -> Literal["held", "linear", "polynomial", "extremal"]:
+    """What the controls are for another problem, whose Hamiltonian does not give them."""
+    return "linear" if run.control_kind == "extremal" else run.control_kind

@@ -1,0 +1,75 @@
+"""What a solved trial shows: constraints that never act, controls that never move."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.subject import DiagnosedProblem
+
+_SAME = 1e-5
+
+
+def activity(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Look at the bounds that are active along the trial."""
+    if not subject.trial.status.is_success:
+        return
+    yield from _idle(subject)
+    yield from _saturated(subject)
+    yield from _inactive(subject)
+
+
+def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """An optimum that is the control nobody chose: zero, or the bound next to it."""
+    ocp, u = subject.ocp, subject.trial.u
+    nothing = ocp.control_bounds.clip(np.zeros_like(u))
+    at_end = bool(ocp.at("terminal"))
+    if at_end or ocp.has_free_time or np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max()):
+        return
+    yield Finding(
+        Cause.NO_GOAL,
+        Severity.WARNING,
+        ocp.model.u_names,
+        "The optimum is to do nothing: every control stays at the number nearest to zero. Is a "
+        "terminal constraint missing, does a reward lack its minus, or is the start the goal?",
+        0.0,
+    )
+
+
+def _saturated(subject: DiagnosedProblem) -> Iterator[Finding]:
+    ocp, u = subject.ocp, subject.trial.u
+    for i, name in enumerate(ocp.model.u_names):
+        for side in ("lower", "upper"):
+            bound = float(np.asarray(getattr(ocp.control_bounds, side))[i])
+            if np.isfinite(bound) and np.abs(u[:, i] - bound).max() <= _SAME * (1 + abs(bound)):
+                unit = subject.unit(name)
+                yield Finding(
+                    Cause.SATURATED,
+                    Severity.ADVICE,
+                    (name,),
+                    f"The control {name} is on its {side} bound {bound:g} {unit}".rstrip()
+                    + " all the time: it is no decision. Is the bound, or the sign of its weight, "
+                    "what was meant?",
+                    bound,
+                    unit,
+                )
+
+
+def _inactive(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Path constraints that stay further from their bounds than they ever move."""
+    ocp = subject.ocp
+    for c in ocp.at("path"):
+        values = subject.tried.evaluate(ocp, c.expression)
+        inside = np.minimum(values - np.asarray(c.lower), np.asarray(c.upper) - values).min()
+        moved = np.ptp(values, axis=0).max()
+        if np.isfinite(inside) and inside > max(moved, _SAME * (1.0 + np.abs(values).max())):
+            yield Finding(
+                Cause.INACTIVE,
+                Severity.ADVICE,
+                (c.name,),
+                f"The path constraint '{c.name}' never comes closer to its bounds than "
+                f"{inside:.3g} and moves by {moved:.3g} only: it can be left out, or its numbers "
+                "are not what was meant.",
+                float(inside),
+            )

@@ -1,0 +1,53 @@
+"""A free final time that shrinks to nothing or grows without end."""
+
+from collections.abc import Iterator
+
+from ocp import FreeTime
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.subject import DiagnosedProblem
+
+# A lower bound below this share of the guess is none; the time sits on it within _AT of it.
+_TINY, _AT = 0.05, 0.05
+# Beyond this many times the guess the time has run away.
+_ENDLESS = 20.0
+
+
+def free_time(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Look at the duration with which the trial ended."""
+    horizon = subject.ocp.horizon
+    if not isinstance(horizon, FreeTime):
+        return
+    duration = subject.trial.duration
+    if duration <= horizon.lower * (1.0 + _AT):
+        yield _vanishing(horizon, duration)
+    elif duration >= min(_ENDLESS * horizon.guess, horizon.upper * (1.0 - 1e-3)):
+        yield _endless(horizon, duration)
+
+
+def _vanishing(horizon: FreeTime, duration: float) -> Finding:
+    tiny = horizon.lower <= _TINY * horizon.guess
+    return Finding(
+        Cause.VANISHING_TIME,
+        Severity.WARNING if tiny else Severity.ADVICE,
+        ("final time",),
+        f"The optimal final time is its lower bound, {duration:.3g} s: nothing has to happen "
+        "first. Is a terminal constraint missing, met at the start already, or a weight on time "
+        "too large? If a shortest time is meant, set FreeTime(lower=...).",
+        duration,
+        "s",
+    )
+
+
+def _endless(horizon: FreeTime, duration: float) -> Finding:
+    runaway = duration >= _ENDLESS * horizon.guess
+    return Finding(
+        Cause.ENDLESS_TIME,
+        Severity.WARNING if runaway else Severity.ADVICE,
+        ("final time",),
+        f"The final time grew to {duration:.3g} s (the guess is {horizon.guess:.3g} s, the upper "
+        f"bound {horizon.upper:.3g} s): the longer, the cheaper. Charge for time (running cost "
+        "1), or set FreeTime(upper=...).",
+        duration,
+        "s",
+    )

@@ -1,0 +1,153 @@
+"""What cannot be met at one instant, whatever the dynamics do."""
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.demands import Asked, at_instant, of_box, of_constraint
+from solvers.diagnose.elastic_program import ElasticProgram, ElasticSolution
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.graph import depends
+from solvers.diagnose.subject import DiagnosedProblem
+
+# Different starts before constraints that are not convex are called contradictory.
+_STARTS = 8
+
+
+def instants(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Look for contradictions on the way and at both ends, then at the start as it is given."""
+    found = [*_anywhere(subject, "on the way"), *_anywhere(subject, "at the end")]
+    if subject.ocp.has_free_start:
+        found += _anywhere(subject, "at the start")
+    elif not found:
+        found += _start(subject)
+    yield from found
+
+
+def _anywhere(subject: DiagnosedProblem, when: str) -> Iterator[Finding]:
+    asked = _asked(subject, when)
+    if not asked:
+        return
+    row = {"at the start": 0, "on the way": len(subject.along.t) // 2, "at the end": -1}[when]
+    t, fraction = float(subject.along.t[row]), {0: 0.0, -1: 1.0}.get(row, 0.5)
+    elastic = at_instant(subject, asked, t, fraction)
+    answer = _least(subject, elastic)
+    if answer is None:
+        return
+    conflict = elastic.conflict(answer, np.empty(0))
+    if not _met_from_elsewhere(elastic, answer, conflict):
+        yield _contradiction(elastic, answer, conflict, when, t)
+
+
+def _asked(subject: DiagnosedProblem, when: str) -> list[Asked]:
+    """Return what holds at an instant; what the end asks of controls is left to the way."""
+    ocp = subject.ocp
+    path = [a for c in ocp.at("path") for a in of_constraint(subject, c)]
+    states = list(of_box(subject, "state"))
+    if when == "on the way":
+        return [*of_box(subject, "control"), *states, *path] if path else []
+    here = ocp.at("terminal" if when == "at the end" else "initial")
+    own = [a for c in here for a in of_constraint(subject, c)]
+    if not own:
+        return []
+    return [*own, *states, *(a for a in path if not depends(a[1], ocp.model.u))]
+
+
+def _least(subject: DiagnosedProblem, elastic: ElasticProgram) -> ElasticSolution | None:
+    """Return the least violating answer over several starts; None if all can be met."""
+    along, around = subject.along, subject.around
+    x = np.vstack([along.x[[0, -1]], around.x])[:_STARTS]
+    u = np.vstack([along.u[[0, -1]], around.u])[:_STARTS]
+    best = None
+    for w0 in np.nan_to_num(np.hstack([x, u])):
+        answer = elastic.solve(w0, np.empty(0), range(len(elastic.demands)))
+        if elastic.is_possible(answer):
+            return None
+        total = elastic.excess(answer).sum()
+        if answer.found and (best is None or total < elastic.excess(best).sum()):
+            best = answer
+    return best
+
+
+def _met_from_elsewhere(
+    elastic: ElasticProgram, answer: ElasticSolution, conflict: tuple[int, ...]
+) -> bool:
+    """Whether all can be met from where all but one of the conflict are.
+
+    The far side of an obstacle is found from where the end is asked for, not from the start.
+    """
+    nothing, every = np.empty(0), range(len(elastic.demands))
+    for left_out in conflict:
+        others = elastic.solve(answer.w, nothing, [i for i in every if i != left_out])
+        if others.found and elastic.is_possible(elastic.solve(others.w, nothing, every)):
+            return True
+    return False
+
+
+def _contradiction(
+    elastic: ElasticProgram, answer: ElasticSolution, conflict: tuple[int, ...], when: str, t: float
+) -> Finding:
+    members = [elastic.demands[i] for i in conflict]
+    worst = int(elastic.excess(answer).argmax())
+    demand, amount = elastic.demands[worst], float(answer.stretch[worst])
+    if len(members) == 1:
+        said = f"{members[0].label[0].upper()}{members[0].label[1:]} cannot be met by itself"
+    else:
+        said = f"No state and control meet together {_listed([d.label for d in members])}"
+    return Finding(
+        Cause.CONTRADICTION,
+        Severity.ERROR,
+        _names(members),
+        f"{said} {when}, whatever the dynamics: {demand.label} would have to give way by "
+        f"{amount:.3g} {demand.unit}".rstrip()
+        + ". Relax one of them.",
+        amount,
+        demand.unit,
+        t,
+    )
+
+
+def _start(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Is there a control with which the given start meets the path constraints?"""
+    ocp, m = subject.ocp, subject.ocp.model
+    path = [a for c in ocp.at("path") for a in of_constraint(subject, c)]
+    if not path:
+        return
+    asked = [*of_box(subject, "control"), *path]
+    x0, t0 = subject.data.x0, subject.data.t0
+    fixed = [(d, ca.substitute(row, m.x, ca.DM(x0)), low, high) for d, row, low, high in asked]
+    elastic = at_instant(subject, fixed, t0, 0.0)
+    answer = elastic.solve(
+        np.append(x0, subject.along.u[0]), np.empty(0), range(len(elastic.demands))
+    )
+    if elastic.is_possible(answer) or not answer.found:
+        return
+    worst = int(elastic.excess(answer).argmax())
+    demand, amount = elastic.demands[worst], float(answer.stretch[worst])
+    equation = any(d == demand and low == high for d, _, low, high in fixed)
+    advice = (
+        "An equation on the whole path holds at the start too: was at='terminal' meant?"
+        if equation
+        else "Change x0, or relax the constraint."
+    )
+    yield Finding(
+        Cause.START_VIOLATES,
+        Severity.ERROR,
+        demand.where,
+        f"At x0, whatever the control, {demand.label} is violated by {amount:.3g} "
+        f"{demand.unit}".rstrip()
+        + f". {advice}",
+        amount,
+        demand.unit,
+        t0,
+    )
+
+
+def _names(demands: list) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for d in demands for name in d.where))
+
+
+def _listed(labels: list[str]) -> str:
+    return " and ".join([", ".join(labels[:-1]), labels[-1]])

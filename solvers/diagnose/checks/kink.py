@@ -1,0 +1,105 @@
+"""Kinks in what is declared smooth, found where they are."""
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.graph import appearing, depends, operations, shown
+from solvers.diagnose.subject import DiagnosedProblem, SamplePoints
+
+# Operations that switch where one argument, or the difference of two, is zero.
+_ONE = (ca.OP_FABS, ca.OP_SIGN)
+_TWO = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_LT, ca.OP_LE)
+_ASIDE = 1e-7
+_JUMP = 1e-4
+_HALVINGS = 50
+
+
+def kink(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Compare value, slope and curvature on both sides of every switch."""
+    ocp, m = subject.ocp, subject.ocp.model
+    terms = (
+        ("the running cost", ca.SX(ocp.running_cost)),
+        ("the terminal cost", ca.SX(ocp.terminal_cost)),
+        ("the dynamics", m.f),
+    )
+    for what, expression in terms:
+        for node in operations(expression):
+            switch = _switch(node)
+            if switch is None or not depends(switch, ca.vertcat(m.x, m.u)):
+                continue
+            order = _smoothness(subject, expression, switch)
+            if order is not None and order < ocp.smoothness:
+                yield _finding(subject, what, node, switch, order)
+
+
+def _switch(node: ca.SX) -> ca.SX | None:
+    if node.op() in _ONE:
+        return node.dep(0)
+    return node.dep(0) - node.dep(1) if node.op() in _TWO else None
+
+
+def _smoothness(subject: DiagnosedProblem, expression: ca.SX, switch: ca.SX) -> int | None:
+    """Return how often the expression is differentiable across the switch; None if unknown."""
+    on = _on_switch(subject, switch)
+    if on is None:
+        return None
+    point, direction = on
+    m = subject.ocp.model
+    z = ca.vertcat(m.x, m.u)
+    slope = ca.jacobian(expression, z)
+    bend = ca.jacobian(slope, z)
+    before, after = (_shift(point, s * _ASIDE * direction, m.nx) for s in (-1, 1))
+    for order, derivative in enumerate((expression, slope, bend)):
+        left, right = (p.evaluate(subject.ocp, derivative) for p in (before, after))
+        jump = np.abs(right - left).max()
+        if not jump <= _JUMP * (1.0 + np.abs(left).max()):
+            return order - 1
+    return 2
+
+
+def _on_switch(subject: DiagnosedProblem, switch: ca.SX) -> tuple[SamplePoints, np.ndarray] | None:
+    """Return a point at which the switch is zero, and a direction across it, by bisection."""
+    ocp, m = subject.ocp, subject.ocp.model
+    points = subject.around + subject.along
+    values = points.evaluate(ocp, switch).ravel()
+    above, below = np.flatnonzero(values > 0.0), np.flatnonzero(values < 0.0)
+    if not above.size or not below.size:
+        return None
+    i, j = above[0], below[0]
+    start, end = (np.hstack([points.x[k], points.u[k]]) for k in (j, i))
+    at = (points.t[[i]], points.p[[i]])
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        z = (start + middle * (end - start))[None, :]
+        value = SamplePoints(z[:, : m.nx], z[:, m.nx :], *at).evaluate(ocp, switch)[0, 0]
+        low, high = (low, middle) if value > 0.0 else (middle, high)
+    z = (start + high * (end - start))[None, :]
+    apart = float(np.linalg.norm(end - start))
+    if apart == 0.0:
+        return None
+    return SamplePoints(z[:, : m.nx], z[:, m.nx :], *at), (end - start) / apart
+
+
+def _shift(point: SamplePoints, by: np.ndarray, nx: int) -> SamplePoints:
+    return SamplePoints(point.x + by[:nx], point.u + by[nx:], point.t, point.p)
+
+
+def _finding(
+    subject: DiagnosedProblem, what: str, node: ca.SX, switch: ca.SX, order: int
+) -> Finding:
+    sort = {-1: "jumps", 0: "has a kink", 1: "has a jump in its second derivative"}[order]
+    return Finding(
+        Cause.KINK,
+        Severity.WARNING,
+        appearing(subject.ocp, switch),
+        f"{what[0].upper()}{what[1:]} {sort} where {shown(switch)} = 0, in {shown(node)}, but "
+        f"smoothness={subject.ocp.smoothness} is declared: Newton's method may cycle there. "
+        f"Declare smoothness={max(order, 0)}, or smooth it (sqrt(a**2 + eps**2) for abs(a), a "
+        "slack variable for a maximum).",
+        float(order),
+    )

@@ -1,0 +1,105 @@
+"""``diagnose``: all checks on one problem, those that need no solve first."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ocp import OCP, ProblemError, Solution
+from ocp.internal import RunData
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.checks.activity import activity
+from solvers.diagnose.checks.curvature import curvature
+from solvers.diagnose.checks.degrees import degrees
+from solvers.diagnose.checks.duplicate import duplicate
+from solvers.diagnose.checks.free_time import free_time
+from solvers.diagnose.checks.grid import grid, referee
+from solvers.diagnose.checks.guess import guess
+from solvers.diagnose.checks.infeasible import infeasible
+from solvers.diagnose.checks.influence import influence
+from solvers.diagnose.checks.instants import instants
+from solvers.diagnose.checks.kink import kink
+from solvers.diagnose.checks.not_finite import not_finite
+from solvers.diagnose.checks.scaling import scaling
+from solvers.diagnose.checks.time_kind import time_kind
+from solvers.diagnose.checks.unbounded import unbounded
+from solvers.diagnose.checks.unreachable import unreachable
+from solvers.diagnose.checks.vacuous import vacuous
+from solvers.diagnose.diagnosis import Diagnosis
+from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.subject import DiagnosedProblem
+from solvers.direct.multiple_shooting import MultipleShooting
+
+Check = Callable[[DiagnosedProblem], Iterator[Finding]]
+
+# Reading, evaluating, solving at one instant.
+_BEFORE: tuple[Check, ...] = (
+    not_finite,
+    degrees,
+    time_kind,
+    vacuous,
+    instants,
+    influence,
+    unreachable,
+    curvature,
+    grid,
+    duplicate,
+    kink,
+    guess,
+)
+# What a trial solve shows.
+_AFTER: tuple[Check, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
+
+# Enough for a trial; a solve that needs more is reported as such.
+_ITERATIONS = 200
+
+
+def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
+    """Say what is wrong with a problem, or with the problem behind a solution.
+
+    Every check looks for one kind of mistake; what it finds names constraint, state or control,
+    instant, unit and amount, and says what to do. Where a check that needs no solve finds an
+    error, no solve is tried: what it would show is a consequence.
+
+    Args:
+        asked: a problem, or a solution of it by any solver; of the latter also start, initial
+            time, parameters, and the distance of its states from the true ones.
+        intervals: grid of the trial solve, for problems in continuous time.
+
+    Returns:
+        findings, the most probable cause first; none where nothing was found. That is no proof:
+        a well-posed problem that is not the one that was meant looks like any other.
+
+    Raises:
+        ProblemError: if ``asked`` is neither.
+    """
+    if not isinstance(asked, OCP | Solution):
+        raise ProblemError(f"diagnose takes an OCP or a Solution, not {type(asked).__name__}")
+    subject = _subject(asked, MultipleShooting(intervals, max_iterations=_ITERATIONS))
+    with np.errstate(all="ignore"):  # what is not finite is looked for, not warned of
+        findings = [finding for check in _BEFORE for finding in check(subject)]
+        if not any(f.severity is Severity.ERROR for f in findings):
+            findings += [finding for check in _AFTER for finding in check(subject)]
+            findings += _unsolved(subject, findings)
+    return Diagnosis.of(subject.ocp.name, findings)
+
+
+def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProblem:
+    if isinstance(asked, Solution):
+        return DiagnosedProblem(asked.problem, asked.data, solver, asked)
+    return DiagnosedProblem(asked, RunData(asked.start(), 0.0, asked.parameter_values()), solver)
+
+
+def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Finding]:
+    """Say so where the trial failed and nothing that was found explains it."""
+    trial = subject.trial
+    if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
+        return
+    yield Finding(
+        Cause.UNSOLVED,
+        Severity.WARNING,
+        (subject.ocp.name,),
+        f"Multiple shooting ended with {trial.status.name}: {trial.status.value}. "
+        f"{trial.message}".rstrip()
+        + " Give a guess of the trajectory, or try multistart.",
+        float(trial.iterations),
+    )

@@ -1,0 +1,176 @@
+"""How far constraints must give way, and the fewest that exclude each other."""
+
+from collections.abc import Iterable
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from functools import cached_property
+from io import StringIO
+
+import casadi as ca
+import numpy as np
+
+# A constraint that must give way by more than this, relative to its size, is violated.
+VIOLATED = 1e-5
+# Weight of the distance from the first iterate, which picks one of many answers. The penalty on
+# the slack is exact, so that it does not stretch what can be met.
+_NEAR = 1e-5
+_OPTIONS = {
+    "expand": True,
+    "print_time": False,
+    "error_on_fail": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "ipopt.max_iter": 120,
+}
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What one or several rows ask for; it gives way as a whole.
+
+    Attributes:
+        where: the constraint, state or control it belongs to.
+        label: how a sentence calls it.
+        unit: of its violation.
+        size: by how much it has to give way to count as 1.
+        is_control: whether it is a bound of a control.
+    """
+
+    where: tuple[str, ...]
+    label: str
+    unit: str = ""
+    size: float = 1.0
+    is_control: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticSolution:
+    """An answer of the elastic problem.
+
+    Attributes:
+        w: the unknowns.
+        stretch: by how much each demand gives way, (G,).
+        weight: multiplier of every row, (m,).
+        found: whether the solver converged.
+    """
+
+    w: np.ndarray
+    stretch: np.ndarray
+    weight: np.ndarray
+    found: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ElasticProgram:
+    r"""Demands with slack: L1 over the demands, the largest violation within each.
+
+    .. math:: \min_{w,\, s \ge 0} \sum_g s_g / \text{size}_g \quad \text{s.t.} \quad
+              \text{lower} - s_{g(i)} \le e_i(w) \le \text{upper} + s_{g(i)}, \quad
+              \text{hard}(w) = 0
+
+    A local answer: where the rows are not convex, what it calls impossible is impossible near
+    where it started. Source: [Chinneck 2008].
+
+    Attributes:
+        w: unknowns.
+        p: data; empty where there are none.
+        hard: what must vanish, come what may.
+        rows: e(w), (m,).
+        lower: (m,).
+        upper: (m,).
+        owner: the demand each row belongs to, (m,).
+        demands: all of them, G.
+        box: bounds of w that are never relaxed, two arrays.
+    """
+
+    w: ca.MX
+    p: ca.MX
+    hard: ca.MX
+    rows: ca.MX
+    lower: np.ndarray
+    upper: np.ndarray
+    owner: np.ndarray
+    demands: tuple[Demand, ...]
+    box: tuple[np.ndarray, np.ndarray]
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        return np.array([d.size for d in self.demands])
+
+    @cached_property
+    def _nlp(self) -> ca.Function:
+        s = ca.MX.sym("s", len(self.demands))
+        slack = s[[int(i) for i in self.owner]]
+        near = ca.MX.sym("near", self.w.numel())
+        apart = (self.w - near) / (1.0 + ca.fabs(near))
+        nlp = {
+            "x": ca.vertcat(self.w, s),
+            "p": ca.vertcat(self.p, near),
+            "f": ca.dot(s, ca.DM(1.0 / self._sizes)) + _NEAR * ca.sumsqr(apart),
+            "g": ca.vertcat(self.hard, self.rows + slack, self.rows - slack),
+        }
+        return ca.nlpsol("elastic", "ipopt", nlp, _OPTIONS)
+
+    def solve(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        kept: Iterable[int],
+        soft: Iterable[int] | None = None,
+    ) -> ElasticSolution:
+        """Solve with the ``kept`` demands only, of which the ``soft`` ones (all) may give way."""
+        kept = list(kept)
+        on = np.isin(self.owner, kept)
+        gives = np.isin(np.arange(len(self.demands)), kept if soft is None else list(soft))
+        many, zeros = np.full(len(on), np.inf), np.zeros(self.hard.numel())
+        # CasADi warns of multipliers that are not finite, whatever its options say.
+        with redirect_stderr(StringIO()):
+            answer = self._nlp(
+                x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
+                p=np.append(p, w0),
+                lbx=np.append(self.box[0], np.zeros(len(gives))),
+                ubx=np.append(self.box[1], np.where(gives, np.inf, 0.0)),
+                lbg=np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),
+                ubg=np.concatenate([zeros, many, np.where(on, self.upper, np.inf)]),
+            )
+        values, rows = np.array(answer["x"]).ravel(), self.rows.numel()
+        weights = np.array(answer["lam_g"]).ravel()[self.hard.numel() :].reshape(2, rows)
+        finite = np.isfinite(values).all() and np.isfinite(weights).all()
+        split = len(values) - len(gives)
+        return ElasticSolution(
+            w=values[:split],
+            stretch=np.maximum(values[split:], 0.0),
+            weight=np.abs(weights).sum(axis=0),
+            found=bool(self._nlp.stats()["success"] and finite),
+        )
+
+    def excess(self, answer: ElasticSolution) -> np.ndarray:
+        """Return by how much each demand gives way, relative to its size."""
+        return answer.stretch / self._sizes
+
+    def is_possible(self, answer: ElasticSolution) -> bool:
+        """Whether nothing has to give way."""
+        return answer.found and float(self.excess(answer).sum()) <= VIOLATED
+
+    def conflict(self, first: ElasticSolution, p: np.ndarray) -> tuple[int, ...]:
+        """Return a smallest set of demands that exclude each other, by the deletion filter.
+
+        Demands without a multiplier go at once, if the rest is still impossible; then each of
+        the others, one by one: what can go while the rest stays impossible was not needed.
+        """
+        price = np.zeros(len(self.demands))
+        np.add.at(price, self.owner, first.weight)
+        kept = list(range(len(self.demands)))
+        needed = [i for i in kept if price[i] > 1e-6 * price.max(initial=0.0)]
+        if len(needed) < len(kept) and self._impossible(first, p, needed):
+            kept = needed
+        for demand in sorted(kept, key=lambda i: price[i]):
+            fewer = [i for i in kept if i != demand]
+            if fewer and self._impossible(first, p, fewer):
+                kept = fewer
+        return tuple(kept)
+
+    def _impossible(self, first: ElasticSolution, p: np.ndarray, kept: list[int]) -> bool:
+        answer = self.solve(first.w, p, kept)
+        return answer.found and not self.is_possible(answer)

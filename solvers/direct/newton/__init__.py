@@ -1,0 +1,1 @@
+"""Newton's method on multiple shooting, solved by a Riccati recursion."""

@@ -1,0 +1,210 @@
+"""The nonlinear programming backends: their options, and answers that are always finite."""
+
+import warnings
+from contextlib import nullcontext, redirect_stderr
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from ocp import ProblemError, UnsupportedProblem, Work
+from ocp.internal import Transcription, check_positive, check_whole
+from solvers.direct.subprocess_function import (
+    SUBPROCESS_SUPPORTED,
+    SubprocessFunction,
+    SubprocessLost,
+)
+from solvers.direct.transcribed_problem import TranscribedProblem
+
+
+@dataclass(frozen=True)
+class NlpBackend:
+    """A backend with what a user may set.
+
+    Args:
+        name: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
+        tolerance: of the optimality conditions.
+        max_iterations: limit.
+        verbose: let it print.
+        time_limit: for one run [s]. IPOPT looks at the clock in each iteration and returns its
+            iterate. fatrop knows no clock, and for ever tries to solve a linear system that has
+            no solution, whatever the limit of iterations: where it is limited it runs in a
+            process of its own, see ``SubprocessFunction``, and once ended it has nothing to show.
+    """
+
+    name: Literal["ipopt", "fatrop"] = "ipopt"
+    tolerance: float = 1e-9
+    max_iterations: int = 300
+    verbose: bool = False
+    time_limit: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        if self.name not in ("ipopt", "fatrop"):
+            raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
+        check_whole(self.max_iterations, "a backend's max_iterations")
+        check_positive(self.tolerance, "a backend's tolerance")
+        check_positive(self.time_limit, "a backend's time_limit [s]", finite=False)
+
+    def build(self, transcription: TranscribedProblem) -> "Nlp":
+        """Set the backend up for a transcribed problem.
+
+        Raises:
+            UnsupportedProblem: for what fatrop cannot treat.
+        """
+        own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
+        common = {
+            "error_on_fail": False,
+            "show_eval_warnings": False,
+            "print_time": self.verbose,
+            f"{self.name}.print_level": 5 if self.verbose else 0,
+            f"{self.name}.max_iter": self.max_iterations,
+        }
+        function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
+        return Nlp(function, self.verbose, self._subprocess(function))
+
+    def _subprocess(self, function: ca.Function) -> SubprocessFunction | None:
+        """Return the process for a backend that may not return, where one is wanted."""
+        if self.name != "fatrop" or self.time_limit == np.inf:
+            return None
+        if not SUBPROCESS_SUPPORTED:
+            warnings.warn(
+                "a time limit of fatrop needs fork and alarms, which this system lacks: "
+                "it runs without one",
+                stacklevel=2,
+            )
+            return None
+        return SubprocessFunction(function, self.time_limit, verbose=self.verbose)
+
+    def _ipopt(self) -> dict[str, Any]:
+        clock = {"ipopt.max_wall_time": self.time_limit} if self.time_limit < np.inf else {}
+        # IPOPT otherwise returns controls outside their bounds, by up to 1e-8 relative.
+        relax = {"ipopt.bound_relax_factor": 0.0}
+        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock}
+
+    def _fatrop(self, transcription: TranscribedProblem) -> dict[str, Any]:
+        if not isinstance(transcription, Transcription):
+            raise UnsupportedProblem("fatrop takes the stages of multiple shooting alone")
+        _refuse_for_fatrop(transcription)
+        return {
+            "structure_detection": "auto",
+            "equality": [row.is_equation for row in transcription.rows],
+            "fatrop.tolerance": self.tolerance,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A backend that is set up.
+
+    Attributes:
+        function: the ``casadi.nlpsol``.
+        verbose: whether it may print.
+        subprocess: the process that it runs in; None: this one.
+    """
+
+    function: ca.Function
+    verbose: bool
+    subprocess: SubprocessFunction | None = None
+
+    def solve(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> "NlpResult":
+        """Run it; where a number comes back that is not finite, return the first iterate.
+
+        Args:
+            w0: first iterate.
+            p: data of the problem.
+            bounds: lbx, ubx, lbg, ubg.
+        """
+        inputs = {"x0": w0, "p": p, **bounds}
+        try:
+            raw, stats = self.subprocess(inputs) if self.subprocess else self._here(inputs)
+        except RuntimeError:  # fatrop throws where functions are not finite
+            stats = {"return_status": "it threw an exception", "success": False}
+            return NlpResult.nothing(w0, len(bounds["lbg"]), stats)
+        except SubprocessLost as loss:
+            stats = {"return_status": str(loss), "success": False}
+            return NlpResult.nothing(w0, len(bounds["lbg"]), stats, is_lost=True)
+        if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
+            return NlpResult.nothing(w0, len(bounds["lbg"]), stats)
+        # The interior point may sit outside a bound by rounding; what is returned does not.
+        w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
+        return NlpResult(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
+
+    def _here(self, inputs: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        # CasADi warns of multipliers that are not finite, whatever its options say.
+        with nullcontext() if self.verbose else redirect_stderr(StringIO()):
+            raw = {name: np.array(value).ravel() for name, value in self.function(**inputs).items()}
+        return raw, self.function.stats()
+
+
+@dataclass(frozen=True, eq=False)
+class NlpResult:
+    """What a backend returned, with every number finite but the cost.
+
+    Attributes:
+        w: unknowns, within their bounds.
+        cost: inf where the backend met a number that is not finite.
+        g: constraints.
+        lam_x: multipliers of the bounds.
+        lam_g: multipliers of the constraints.
+        stats: the backend's own words.
+        is_lost: whether there is no answer, since its process was ended.
+    """
+
+    w: np.ndarray
+    cost: float
+    g: np.ndarray
+    lam_x: np.ndarray
+    lam_g: np.ndarray
+    stats: dict[str, Any]
+    is_lost: bool = False
+
+    @classmethod
+    def nothing(
+        cls, w0: np.ndarray, rows: int, stats: dict[str, Any], *, is_lost: bool = False
+    ) -> "NlpResult":
+        """Return the first iterate, where the backend has nothing to show."""
+        zeros = np.zeros(rows)
+        return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats, is_lost)
+
+    @property
+    def success(self) -> bool:
+        """Whether the backend says so."""
+        return bool(self.stats.get("success"))
+
+    @property
+    def word(self) -> str:
+        """How the backend names the end."""
+        return str(self.stats.get("return_status", ""))
+
+    @property
+    def count(self) -> int:
+        """Iterations."""
+        return int(self.stats.get("iter_count", 0))
+
+    @property
+    def work(self) -> Work:
+        """Evaluations and factorisations."""
+        calls = [int(self.stats.get(f"n_call_nlp_{name}", 0)) for name in ("g", "jac_g")]
+        return Work(*calls, factorisations=self.count)
+
+    def history(self, name: str) -> np.ndarray:
+        """Return a quantity per iteration; empty where the backend keeps none."""
+        return np.array((self.stats.get("iterations") or {}).get(name, []))
+
+
+def _refuse_for_fatrop(transcription: Transcription) -> None:
+    """Refuse what fatrop would meet with an assertion of its own, printed by itself."""
+    ocp, n = transcription.ocp, transcription.n
+    if any(not c.is_equation for c in ocp.at("initial")):
+        raise UnsupportedProblem(f"{ocp.name}: fatrop takes no inequality at the start; use ipopt")
+    for node, unknowns in ((0, transcription.nz + ocp.model.nu), (n, transcription.nz)):
+        rows = [r for r in transcription.rows if r.node == node and r.is_equation]
+        rows = [r for r in rows if r.place in ("path", "initial", "terminal")]
+        if len(rows) > unknowns:
+            raise UnsupportedProblem(
+                f"{ocp.name}: {len(rows)} equations for {unknowns} unknowns at node {node} "
+                f"(the last is '{rows[-1].name}'); fatrop takes no more equations than unknowns"
+            )

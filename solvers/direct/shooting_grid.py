@@ -1,0 +1,76 @@
+"""The intervals of a direct method: their data, where to start, and how accurate they are."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ocp import OCP, InitialGuess, Integrator
+from ocp.internal import BufferedFunction, RunData, Stage, compiled
+
+
+@dataclass(frozen=True, eq=False)
+class ShootingGrid:
+    """A problem on N equal intervals with one held control each.
+
+    Attributes:
+        ocp: the problem.
+        n: number of intervals N.
+        rollout: all intervals in a row.
+        halved: every interval on its own, with half the step.
+    """
+
+    ocp: OCP
+    n: int
+    rollout: BufferedFunction
+    halved: BufferedFunction
+
+    @classmethod
+    def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "ShootingGrid":
+        """Build them; ``fast``: as machine code."""
+        finer = replace(integrator, steps=2 * integrator.steps)
+        steps = [Stage.of(ocp, each, held=True).step for each in (integrator, finer)]
+        step, halved = map(compiled, steps) if fast else steps
+        return cls(ocp, n, BufferedFunction(step.mapaccum(n)), BufferedFunction(halved.map(n)))
+
+    @cached_property
+    def fractions(self) -> np.ndarray:
+        """Nodes as fractions of the horizon, (N + 1,)."""
+        return np.linspace(0.0, 1.0, self.n + 1)
+
+    def schedule(self, data: RunData, duration: float) -> list[np.ndarray]:
+        """Return times, steps and parameters at both ends of every interval, as columns."""
+        nodes = self.fractions
+        left, right = data.values.on(nodes)
+        t = data.t0 + nodes[None, :-1] * duration
+        return [t, np.full((1, self.n), duration / self.n), left.T, right.T]
+
+    def first_iterate(
+        self, data: RunData, guess: InitialGuess | None, duration: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return states (N + 1, nx) and controls (N, nu) of a guess.
+
+        Without states they are the controls' own roll-out; where that is not finite, the start.
+        """
+        ocp, m, nodes = self.ocp, self.ocp.model, self.fractions
+        x = guess.sample("x", nodes, m.nx) if guess else None
+        u = guess.sample("u", nodes[:-1], m.nu) if guess else None
+        u = ocp.control_bounds.clip(np.zeros((self.n, m.nu)) if u is None else u)
+        if x is None:
+            x, _ = self.rollout(data.x0, u.T, *self.schedule(data, duration))
+            x = np.vstack([data.x0, x.T])
+        if not np.isfinite(x).all():
+            x = np.tile(data.x0, (self.n + 1, 1))
+        return x, u
+
+    def error(self, x: np.ndarray, u: np.ndarray, schedule: list[np.ndarray]) -> tuple[float, int]:
+        """Return by how much half the step moves the end of an interval, and of which.
+
+        Relative to 1 + abs(x); a discrete-time problem has no error.
+        """
+        if self.ocp.model.is_discrete:
+            return 0.0, 0
+        after, _ = self.halved(x[:-1].T, u.T, *schedule)
+        moved = np.abs(after.T - x[1:]) / (1.0 + np.abs(x[1:]))
+        worst = int(moved.max(axis=1).argmax())
+        return float(moved[worst].max()), worst + 1

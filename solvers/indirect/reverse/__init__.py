@@ -1,0 +1,1 @@
+"""Extremals by reverse integration from their final state."""

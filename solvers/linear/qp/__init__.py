@@ -1,0 +1,1 @@
+"""Quadratic programs: backends, the active set, and the least violating point."""
