@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ocp import RK4, Compiler, InterpretedWarning, ProblemError
-from ocp.internal import BufferedFunction, Stage, compiled
+from ocp.internal import BufferedFunction, Stage, c_code, compiled
 from tests.mpc.problems import cart
 
 # Machine code may contract a multiplication and an addition to one rounding.
@@ -128,7 +128,8 @@ def test_long_code_is_not_optimised(tmp_path):
 BUILD = """
 import sys
 from pathlib import Path
-from ocp import Compiler, compiled
+from ocp import Compiler
+from ocp.internal import compiled
 from tests.ocp.test_compile import pendulum
 fast = compiled(pendulum(), along=("x", "u"), compiler=Compiler(cache=Path(sys.argv[1])))
 assert fast.is_a("External")
@@ -257,3 +258,18 @@ def test_what_a_buffered_function_returned_stays_as_it_was():
 def test_a_buffered_function_refuses_other_shapes(x):
     with pytest.raises(ValueError, match=r"\(2, 1\) is needed"):
         BufferedFunction(pendulum())(x, 0.0, 0.0)
+
+
+@needs_compiler
+def test_machine_code_that_gives_other_numbers_is_not_used(tmp_path, monkeypatch):
+    """A compiler that is wrong in one derivative, as gcc 12 is with AVX-512."""
+    other, function = pendulum(), pendulum()
+    x, u, t = other.sx_in()
+    after, cost = other.call([x, u, t])
+    wrong = ca.Function("step", [x, u, t], [after, cost + 1e-3], other.name_in(), other.name_out())
+    built = c_code(wrong, ("x", "u"))
+    monkeypatch.setattr("ocp.codegen.compile.c_code", lambda *_: built)
+    with pytest.warns(InterpretedWarning, match="step gives other numbers"):
+        fast = compiled(function, along=("x", "u"), compiler=Compiler(cache=tmp_path))
+    assert not fast.is_a("External")
+    assert_same(declared(function, {"x", "u"}), fast, 0)
