@@ -18,8 +18,9 @@ from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
-from ocp.nlp.constraint_rows import ConstraintRow, most_violated, rows_of
+from ocp.nlp.program_rows import most_violated
 from ocp.nlp.transcription import Transcription
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
@@ -28,6 +29,7 @@ from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, el
 __all__ = [
     "BufferedFunction",
     "ConstraintRow",
+    "ConstraintRows",
     "LQData",
     "LinearQuadratic",
     "Matrices",
@@ -36,6 +38,7 @@ __all__ = [
     "RunData",
     "Stage",
     "Transcription",
+    "Violation",
     "bernstein",
     "c_code",
     "check_callable",
@@ -51,7 +54,6 @@ __all__ = [
     "hamiltonian",
     "interpolate",
     "most_violated",
-    "rows_of",
     "stage_hessian",
     "start_violation",
     "stationary",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import NamedTuple
 
 import casadi as ca
@@ -11,7 +12,7 @@ from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.compile import compiled
 from ocp.integration.one_step import RK4, Stage
 from ocp.problem.cache import once_per_problem
-from ocp.problem.constraint import Box, stacked_box
+from ocp.problem.constraint_rows import Violation
 from ocp.problem.ocp import OCP
 
 # Parameters at the left and at the right end of each interval, (N, n_p) each.
@@ -71,28 +72,24 @@ class ModelRollout:
         self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
     ) -> tuple[float, str]:
         """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
-        ocp, m = self.ocp, self.ocp.model
-        found = [(0.0, "")]
-        if ocp.state_bounds.is_active:
-            found.append(_largest("state", m.x_names, ocp.state_bounds.excess(x[1:])))
-        if ocp.control_bounds.is_active:
-            found.append(_largest("control", m.u_names, ocp.control_bounds.excess(u)))
-        if self._path_names:
+        rows, found = self.ocp.rows, [Violation()]
+        if rows.states.is_imposed:
+            found.append(rows.states.largest_violation(x[1:], t[1:]))
+        if rows.controls.is_imposed:
+            found.append(rows.controls.largest_violation(u, t))
+        if rows.path:
             nodes = np.vstack([p[0], p[1][-1:]])
-            rows = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
-            excess = self._path_box.excess(rows)
-            excess[0, ~ocp.functions.path_on_control] = 0.0
-            found.append(_largest("constraint", self._path_names, excess))
-        return max(found)
+            values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
+            found.append(rows.path.largest_violation(values, t, exempt=self._decided_by_start))
+        return _in_words(max(found, key=_amount))
 
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
         """Return the largest violation of a terminal constraint by a final state (nx,)."""
-        terminal = self.ocp.at("terminal")
+        terminal = self.ocp.rows.terminal
         if not terminal:
             return 0.0, ""
-        rows = np.array(self.ocp.functions.terminal(x, t, p)).T
-        names = tuple(c.name for c in terminal for _ in range(c.size))
-        return _largest("terminal constraint", names, stacked_box(terminal).excess(rows))
+        values = np.array(self.ocp.functions.terminal(x, t, p)).T
+        return _in_words(terminal.largest_violation(values, np.array([t])))
 
     @cached_property
     def _rollout(self) -> BufferedFunction:
@@ -104,12 +101,12 @@ class ModelRollout:
         return BufferedFunction(self.ocp.functions.path.map(self.n + 1))
 
     @cached_property
-    def _path_names(self) -> tuple[str, ...]:
-        return tuple(c.name for c in self.ocp.at("path") for _ in range(c.size))
-
-    @cached_property
-    def _path_box(self) -> Box:
-        return stacked_box(self.ocp.at("path"))
+    def _decided_by_start(self) -> np.ndarray:
+        """Where path constraints follow from the measured state alone, bool (N + 1, m)."""
+        rows = self.ocp.rows.path
+        decided = np.zeros((self.n + 1, len(rows)), dtype=bool)
+        decided[0] = ~rows.on_control
+        return decided
 
 
 @once_per_problem
@@ -122,6 +119,8 @@ def _compiled_step(ocp: OCP) -> ca.Function:
     return compiled(_step(ocp))
 
 
-def _largest(kind: str, names: tuple[str, ...], excess: np.ndarray) -> tuple[float, str]:
-    k, i = np.unravel_index(int(excess.argmax()), excess.shape)
-    return float(excess[k, i]), f"{kind} {names[i]} is violated by {excess[k, i]:.3g}"
+_amount = attrgetter("amount")
+
+
+def _in_words(violation: Violation) -> tuple[float, str]:
+    return violation.amount, str(violation)

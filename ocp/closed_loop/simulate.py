@@ -18,7 +18,6 @@ from ocp.closed_loop.decision import Controller, ControlRefused, Decision
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.plant import Plant, RunningPlant
 from ocp.closed_loop.rollout import Rollout
-from ocp.problem.constraint import Constraint
 from ocp.problem.ocp import OCP
 
 SensorFault = Callable[[np.ndarray, float], np.ndarray]
@@ -144,7 +143,7 @@ class _Journal:
         """Let an input act for an interval, and write everything down."""
         cost, excess, worst = self.running.advance(acting, dt)
         if excess > self.violation:
-            self.violation, self.worst = excess, f"{worst} before t = {self.running.t:.4g} s"
+            self.violation, self.worst = excess, worst
         self.measured.append(told)
         self.inputs.append(acting)
         self.decisions.append(decision)
@@ -182,12 +181,4 @@ def _drift(ocp: OCP, t: np.ndarray, x: np.ndarray) -> float:
         return 0.0
     p = ocp.parameter_values().at(0.0)[0]
     rows = np.array([ocp.functions.invariants(*row, p) for row in zip(x, t, strict=True)])
-    return _excess(ocp.invariants, rows.reshape(len(t), -1))
-
-
-def _excess(constraints: tuple[Constraint, ...], rows: np.ndarray) -> float:
-    first, worst = 0, 0.0
-    for c in constraints:
-        worst = max(worst, float(c.box.excess(rows[:, first : first + c.size]).max(initial=0.0)))
-        first += c.size
-    return worst
+    return float(ocp.rows.invariants.excess(rows.reshape(len(t), -1)).max(initial=0.0))

@@ -3,14 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import casadi as ca
 
 from ocp.checks.arguments import check_whole
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.ocp import OCP
 
 # Written for SX; MX does as well, where a control law holds a root finder.
 Rate = Callable[[ca.SX, ca.SX | float], ca.SX]
@@ -128,7 +126,7 @@ class Stage:
     adjoint: ca.Function
 
     @classmethod
-    def of(cls, ocp: "OCP", integrator: Integrator, *, held: bool, curved: bool = False) -> "Stage":
+    def of(cls, ocp: OCP, integrator: Integrator, *, held: bool, curved: bool = False) -> "Stage":
         """Build the stage of a problem under an integrator, for a control of one kind."""
         m, n_p = ocp.model, ocp.p.numel()
         controls = ("u0",) if held else ("u0", "um", "u1") if curved else ("u0", "u1")
@@ -146,7 +144,7 @@ class Stage:
         )
 
 
-def _one_step(ocp: "OCP", integrator: Integrator, s: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
+def _one_step(ocp: OCP, integrator: Integrator, s: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:
     nx, functions = ocp.model.nx, ocp.functions
     if ocp.model.is_discrete:
         now = (s["x"], s["u0"], s["t"], s["p0"])

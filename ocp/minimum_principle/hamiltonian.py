@@ -1,14 +1,11 @@
 """The Hamiltonian of a problem and its derivatives."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from ocp.problem.cache import once_per_problem
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.ocp import OCP
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +44,7 @@ class Hamiltonian:
 
 
 @once_per_problem
-def hamiltonian(ocp: "OCP") -> Hamiltonian:
+def hamiltonian(ocp: OCP) -> Hamiltonian:
     r"""Derive :math:`H = L + \lambda' f` and its derivatives, once for each problem.
 
     Args:

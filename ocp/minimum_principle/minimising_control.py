@@ -1,14 +1,12 @@
 """The control that minimises the Hamiltonian, in closed form or as an implicit root."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ocp.minimum_principle.hamiltonian import Hamiltonian
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.ocp import OCP
 
 _LAW_INPUTS = ["x", "costate", "t", "p"]
 # Where the root of H_u is looked for: so many steps of descent lead into the valley of a minimum,
@@ -20,7 +18,7 @@ _REACHES = (4.0, 1.0, 0.25, 1.0 / 16.0)
 _LEAST_CURVATURE = 1e-8
 
 
-def minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
+def minimising_control(ocp: OCP, h: Hamiltonian) -> ca.Function:
     """Return (x, costate, t, p) -> the control minimising H within its bounds, (nu,).
 
     Closed form where H is quadratic in u, saturated at the bounds; else an implicit root.
@@ -36,7 +34,7 @@ def minimising_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     return ca.Function("control", [m.x, e.costate, m.t, p], [bounded], _LAW_INPUTS, ["u"])
 
 
-def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
+def _implicit_control(ocp: OCP, h: Hamiltonian) -> ca.Function:
     """Root in u of the natural residual u - clip(u - H_u), by Newton from where descent led."""
     m, box = ocp.model, ocp.control_bounds
     u = ca.MX.sym("u", m.nu)
@@ -59,7 +57,7 @@ def _implicit_control(ocp: "OCP", h: Hamiltonian) -> ca.Function:
     return ca.Function("control", inputs, [bounded], _LAW_INPUTS, ["u"])
 
 
-def _descent(ocp: "OCP", h: Hamiltonian) -> ca.Function:
+def _descent(ocp: OCP, h: Hamiltonian) -> ca.Function:
     """(u, x, costate, t, p) -> u after one step down H, within its bounds.
 
     The curvature is H_uu, each row of it shifted where its Gershgorin disc reaches below zero:

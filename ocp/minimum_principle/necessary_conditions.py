@@ -1,7 +1,7 @@
 """Pontryagin's minimum principle of a problem, derived symbolically, once."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,10 +13,8 @@ from ocp.minimum_principle.minimising_control import minimising_control
 from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Constraint
 from ocp.problem.functions import stacked
+from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
 
 # H_uu with a smaller reciprocal condition number does not determine the control.
 _SINGULAR = 1e-10
@@ -52,7 +50,7 @@ class MinimumPrinciple:
 
 
 @once_per_problem
-def minimum_principle(ocp: "OCP") -> MinimumPrinciple:
+def minimum_principle(ocp: OCP) -> MinimumPrinciple:
     """Derive the minimum principle of a continuous-time problem, see ``MinimumPrinciple``.
 
     Args:
@@ -85,7 +83,7 @@ def minimum_principle(ocp: "OCP") -> MinimumPrinciple:
     )
 
 
-def _require_regular(ocp: "OCP", h: Hamiltonian) -> None:
+def _require_regular(ocp: OCP, h: Hamiltonian) -> None:
     """Refuse a Hamiltonian that does not determine the control."""
     m = ocp.model
     for i, name in enumerate(m.u_names):
@@ -109,7 +107,7 @@ def _require_regular(ocp: "OCP", h: Hamiltonian) -> None:
         )
 
 
-def _probed_curvatures(ocp: "OCP", h: Hamiltonian) -> list[np.ndarray]:
+def _probed_curvatures(ocp: OCP, h: Hamiltonian) -> list[np.ndarray]:
     """H_uu at the start, for no costate and no control and for a few random ones."""
     m, rng = ocp.model, np.random.default_rng(0)
     p = ocp.parameter_values().at(0.0)[0]
@@ -119,7 +117,7 @@ def _probed_curvatures(ocp: "OCP", h: Hamiltonian) -> list[np.ndarray]:
     return [np.array(h.control_curvature(ocp.start(), u, c, 0.0, p)) for c, u in probes]
 
 
-def _flow(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
+def _flow(ocp: OCP, control: ca.Function, h: Hamiltonian) -> ca.Function:
     m = ocp.model
     kind = symbol_type(control)
     z, t, p = kind.sym("z", 2 * m.nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
@@ -129,7 +127,7 @@ def _flow(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
     return ca.Function("flow", [z, t, p], [rate], ["z", "t", "p"], ["rate"])
 
 
-def _start(ocp: "OCP") -> ca.Function:
+def _start(ocp: OCP) -> ca.Function:
     m = ocp.model
     costate = ca.SX.sym("costate", m.nx)
     c = _equations(ocp, ocp.at("initial"))
@@ -140,7 +138,7 @@ def _start(ocp: "OCP") -> ca.Function:
     return ca.Function("start", inputs, [ca.vertcat(c, normal)], names, ["residual"])
 
 
-def _end(ocp: "OCP", control: ca.Function, h: Hamiltonian) -> ca.Function:
+def _end(ocp: OCP, control: ca.Function, h: Hamiltonian) -> ca.Function:
     m = ocp.model
     costate = ca.SX.sym("costate", m.nx)
     psi = _equations(ocp, ocp.at("terminal"))
@@ -166,7 +164,7 @@ def symbol_type(function: ca.Function) -> Any:
     return ca.SX if function.is_a("SXFunction") else ca.MX
 
 
-def _equations(ocp: "OCP", constraints: tuple[Constraint, ...]) -> ca.SX:
+def _equations(ocp: OCP, constraints: tuple[Constraint, ...]) -> ca.SX:
     """Return what must vanish, or refuse an inequality."""
     for c in constraints:
         if not c.is_equation:

@@ -10,8 +10,8 @@ from ocp.checks.arguments import check_instance
 from ocp.codegen.compile import compiled
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import Integrator, Stage
-from ocp.nlp.constraint_rows import ConstraintRow, most_violated, rows_of
-from ocp.problem.functions import stacked
+from ocp.nlp.program_rows import most_violated
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 
@@ -158,21 +158,18 @@ class Transcription:
             for name in ocp.model.x_names
         ]
         gap += [ConstraintRow("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = rows_of(ocp.at("path"), "path")
-        on_control = self._depends_on_control
+        path = ocp.rows.path.rows
         rows: list[ConstraintRow] = []
         for k in range(self.n):
             rows += [replace(row, node=k + 1) for row in gap]
             decided = k == 0 and not ocp.has_free_start
-            for row, depends in zip(path, on_control, strict=True):
-                free = {"lower": -np.inf, "upper": np.inf} if decided and not depends else {}
-                rows.append(replace(row, node=k, **free))
+            for row in path:
+                free = decided and not row.on_control
+                bounds = {"lower": -np.inf, "upper": np.inf} if free else {}
+                rows.append(replace(row, node=k, **bounds))
             if k == 0:
-                rows += rows_of(ocp.at("initial"), "initial")
-        last = [row for row, depends in zip(path, on_control, strict=True) if not depends]
-        rows += [
-            replace(row, node=self.n) for row in last + rows_of(ocp.at("terminal"), "terminal")
-        ]
+                rows += ocp.rows.initial.rows
+        rows += [replace(row, node=self.n) for row in self._last_rows.rows]
         return tuple(rows)
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:
@@ -238,12 +235,12 @@ class Transcription:
         return np.array([row.place == place for row in self.rows])
 
     @cached_property
-    def _depends_on_control(self) -> tuple[bool, ...]:
-        return tuple(bool(b) for b in self.ocp.functions.path_on_control)
+    def _last_rows(self) -> ConstraintRows:
+        """What holds at the last node: path constraints without a control, and the end's own."""
+        rows = self.ocp.rows
+        return rows.path.where(~rows.path.on_control) + rows.terminal
 
     @cached_property
     def _last(self) -> ca.Function:
-        m, path = self.ocp.model, stacked(self.ocp.at("path"))
-        rows = [path[i] for i, depends in enumerate(self._depends_on_control) if not depends]
-        last = ca.vertcat(ca.SX(0, 1), *rows, stacked(self.ocp.at("terminal")))
-        return ca.Function("last", [m.x, m.t, self.ocp.p], [last])
+        m = self.ocp.model
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [self._last_rows.expression])

@@ -9,7 +9,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import Box
+from ocp.problem.constraint_rows import ConstraintRows
 from ocp.solution.solution import Solution
 
 # Lines beyond this many take their colours from a continuous map and share a wide legend.
@@ -102,13 +103,13 @@ def _costates(solution: Solution) -> _Panel:
 def _path(solution: Solution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), solution.control(t), t[:, None], _parameters(solution, t)]
-    return _constraints("path constraints", ocp.at("path"), ocp.functions.path, given, t)
+    return _constraints("path constraints", ocp.rows.path, ocp.functions.path, given, t)
 
 
 def _invariants(solution: Solution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), t[:, None], _parameters(solution, t)]
-    return _constraints("invariants", ocp.invariants, ocp.functions.invariants, given, t)
+    return _constraints("invariants", ocp.rows.invariants, ocp.functions.invariants, given, t)
 
 
 def _parameters(solution: Solution, t: np.ndarray) -> np.ndarray:
@@ -117,20 +118,22 @@ def _parameters(solution: Solution, t: np.ndarray) -> np.ndarray:
 
 def _constraints(
     title: str,
-    constraints: tuple[Constraint, ...],
+    rows: ConstraintRows,
     function: ca.Function,
     given: list[np.ndarray],
     t: np.ndarray,
 ) -> _Panel:
-    names = tuple(name for c in constraints for name in _rows_of(c))
-    rows = np.array(function.map(len(t))(*[a.T for a in given])).T.reshape(len(t), len(names))
-    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
-    upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
-    return _Panel(title, names, (), t, rows, Box(lower, upper))
+    values = np.array(function.map(len(t))(*[a.T for a in given])).T.reshape(len(t), len(rows))
+    return _Panel(title, _row_names(rows), (), t, values, rows.box)
 
 
-def _rows_of(c: Constraint) -> tuple[str, ...]:
-    return (c.name,) if c.size == 1 else tuple(f"{c.name} {i}" for i in range(c.size))
+def _row_names(rows: ConstraintRows) -> tuple[str, ...]:
+    """Return the names of the constraints, numbered where one has several rows."""
+    names, found = [row.name for row in rows.rows], []
+    for i, name in enumerate(names):
+        several = names.count(name) > 1
+        found.append(f"{name} {names[:i].count(name)}" if several else name)
+    return tuple(found)
 
 
 _PANELS: tuple[Callable[[Solution], _Panel], ...] = (

@@ -1,29 +1,25 @@
-"""What is derived from a problem is kept as long as the problem is."""
+"""Keep what is derived from a problem as long as the problem exists."""
 
 from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 from ocp.checks.arguments import check_instance
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.ocp import OCP
 
 T = TypeVar("T")
 
 
-def once_per_problem(derive: "Callable[[OCP], T]") -> "Callable[[OCP], T]":
+def once_per_problem(derive: Callable[[OCP], T]) -> Callable[[OCP], T]:
     """Decorate a function of a problem so that it is computed once, and forgotten with it."""
     kept: WeakKeyDictionary[OCP, T] = WeakKeyDictionary()
 
     @wraps(derive)
-    def derived(ocp: "OCP") -> T:
+    def derived(ocp: OCP) -> T:
         try:
             return kept[ocp]
         except (KeyError, TypeError):  # not yet, or no problem: then there may be no key of it
-            from ocp.problem.ocp import OCP  # which is built on this
-
             check_instance(ocp, OCP, f"{derive.__name__.lstrip('_')}: the problem")
         kept[ocp] = derive(ocp)
         return kept[ocp]

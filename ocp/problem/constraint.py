@@ -122,10 +122,3 @@ class Constraint:
     def is_equation(self) -> bool:
         """Whether every row is an equation."""
         return bool(np.all(np.asarray(self.lower) == np.asarray(self.upper)))
-
-
-def stacked_box(constraints: tuple[Constraint, ...]) -> Box:
-    """Return the bounds of several constraints as one box."""
-    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
-    upper = np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
-    return Box(lower, upper)

@@ -1,24 +1,73 @@
 """A problem in mathematics, as text for a person."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint
+from ocp.problem.model import Model
+from ocp.problem.parameters import Parameter, Signal
 
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+
+class _Problem(Protocol):
+    """What of an ``OCP`` is written down: its own file is built on this one."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def x0(self) -> ArrayLike: ...
+
+    @property
+    def duration(self) -> float: ...
+
+    @property
+    def steps(self) -> int | None: ...
+
+    @property
+    def time_box(self) -> Box: ...
+
+    @property
+    def has_free_time(self) -> bool: ...
+
+    @property
+    def has_free_start(self) -> bool: ...
+
+    @property
+    def running_cost(self) -> ca.SX | float: ...
+
+    @property
+    def terminal_cost(self) -> ca.SX | float: ...
+
+    @property
+    def state_bounds(self) -> Box: ...
+
+    @property
+    def control_bounds(self) -> Box: ...
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]: ...
+
+    @property
+    def invariants(self) -> tuple[Constraint, ...]: ...
+
+    @property
+    def parameters(self) -> tuple[Parameter | Signal, ...]: ...
 
 
-def describe(ocp: "OCP") -> str:
+def describe(ocp: _Problem) -> str:
     """Return the problem as it would stand in a paper."""
     return "\n".join(["", *_lines(ocp)]).lstrip("\n")
 
 
-def _lines(ocp: "OCP") -> Iterable[str]:
+def _lines(ocp: _Problem) -> Iterable[str]:
     m = ocp.model
     discrete = m.is_discrete
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"

@@ -1,14 +1,11 @@
 """What a problem says, as numbers: whether a file belongs to it."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ocp.problem.constraint import PLACES, Box, Constraint
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.ocp import OCP
 
 # So many points at which functions are looked at; functions that agree there are the same.
 _POINTS = 3
@@ -17,7 +14,7 @@ _RELATIVE = 1e-9
 _PREFIX = "probe/"
 
 
-def fingerprint(ocp: "OCP") -> dict[str, np.ndarray]:
+def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
     """Return the values of a problem's functions at fixed random points, and its bounds.
 
     Values, not expressions: they stay the same where a term is written in another way or another
@@ -68,12 +65,12 @@ def differing(kept: Mapping[str, np.ndarray], here: Mapping[str, np.ndarray]) ->
     )
 
 
-def fingerprint_entries(ocp: "OCP") -> dict[str, np.ndarray]:
+def fingerprint_entries(ocp: OCP) -> dict[str, np.ndarray]:
     """Return the probe by the names under which an archive keeps it."""
     return {f"{_PREFIX}{part}": values for part, values in fingerprint(ocp).items()}
 
 
-def differing_in(data: Mapping[str, np.ndarray], ocp: "OCP") -> tuple[str, ...]:
+def differing_in(data: Mapping[str, np.ndarray], ocp: OCP) -> tuple[str, ...]:
     """Return the parts in which a problem differs from an archive's; none where it kept none."""
     kept = {k.removeprefix(_PREFIX): v for k, v in data.items() if k.startswith(_PREFIX)}
     return differing(kept, fingerprint(ocp)) if kept else ()

@@ -1,16 +1,12 @@
 """A problem as CasADi Functions: numbers in, numbers out."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import casadi as ca
-import numpy as np
 
-from ocp.problem.constraint import Constraint
-
-if TYPE_CHECKING:
-    from ocp.problem.ocp import OCP
+from ocp.problem.constraint import Constraint, Place
+from ocp.problem.model import Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,16 +40,22 @@ class Functions:
     terminal: ca.Function
     invariants: ca.Function
 
-    @property
-    def path_on_control(self) -> np.ndarray:
-        """Which path constraints depend on the control, bool (m,)."""
-        structure = np.array(ca.DM(self.path.jac_sparsity(0, 1), 1.0))
-        return structure.sum(axis=1) > 0.0
-
     @classmethod
-    def of(cls, ocp: "OCP") -> "Functions":
-        """Build them."""
-        m, p, phi = ocp.model, ocp.p, ca.SX(ocp.terminal_cost)
+    def of(
+        cls,
+        model: Model,
+        p: ca.SX,
+        *,
+        running_cost: ca.SX,
+        terminal_cost: ca.SX,
+        constraints: Sequence[Constraint],
+        invariants: Sequence[Constraint],
+    ) -> "Functions":
+        """Build them from the parts of a problem; p are all parameters and signals (n_p,)."""
+        m, phi = model, terminal_cost
+
+        def at(place: Place) -> ca.SX:
+            return stacked(c for c in constraints if c.at == place)
 
         def along(name: str, expression: ca.SX) -> ca.Function:
             return ca.Function(name, [m.x, m.u, m.t, p], [expression], ["x", "u", "t", "p"], [name])
@@ -61,19 +63,19 @@ class Functions:
         def at_an_end(name: str, *expressions: ca.SX) -> ca.Function:
             return ca.Function(name, [m.x, m.t, p], [ca.densify(e) for e in expressions])
 
-        c, psi = stacked(ocp.at("initial")), stacked(ocp.at("terminal"))
+        c, psi = at("initial"), at("terminal")
         slopes = (ca.gradient(phi, m.t), ca.jacobian(psi, m.x), ca.jacobian(psi, m.t))
         return cls(
             rate=along("rate", m.f),
-            running_cost=along("running_cost", ca.SX(ocp.running_cost)),
+            running_cost=along("running_cost", running_cost),
             terminal_cost=at_an_end("terminal_cost", phi),
             terminal_gradient=at_an_end("terminal_gradient", ca.gradient(phi, m.x)),
             terminal_slopes=at_an_end("terminal_slopes", *slopes),
-            path=along("path", stacked(ocp.at("path"))),
+            path=along("path", at("path")),
             initial=at_an_end("initial", c),
             initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
             terminal=at_an_end("terminal", psi),
-            invariants=at_an_end("invariants", stacked(ocp.invariants)),
+            invariants=at_an_end("invariants", stacked(invariants)),
         )
 
 

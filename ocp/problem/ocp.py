@@ -13,6 +13,7 @@ from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
 from ocp.problem.constraint import Box, Constraint, Place, check_place
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
 from ocp.problem.describe import describe
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
@@ -161,7 +162,29 @@ class OCP:
     @cached_property
     def functions(self) -> Functions:
         """Dynamics, costs and constraints as CasADi Functions, built at first use."""
-        return Functions.of(self)
+        return Functions.of(
+            self.model,
+            self.p,
+            running_cost=ca.SX(self.running_cost),
+            terminal_cost=ca.SX(self.terminal_cost),
+            constraints=self.constraints,
+            invariants=self.invariants,
+        )
+
+    @cached_property
+    def rows(self) -> ProblemRows:
+        """Bounds and constraints as rows that know where they hold, built at first use."""
+        m, box = self.model, self.time_box
+        lower, upper = float(np.asarray(box.lower)[0]), float(np.asarray(box.upper)[0])
+        return ProblemRows(
+            states=ConstraintRows.of_bounds(self.state_bounds, m.x, m.x_names, kind="hard"),
+            controls=ConstraintRows.of_bounds(self.control_bounds, m.u, m.u_names, kind="input"),
+            path=ConstraintRows.of(self.at("path"), "path", m),
+            initial=ConstraintRows.of(self.at("initial"), "initial", m),
+            terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
+            invariants=ConstraintRows.of(self.invariants, "path", m),
+            time=ConstraintRow("final time", "time", 0, lower, upper),
+        )
 
     def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
         """Return the numbers of a run: the declared ones, replaced by those ``given``."""

@@ -7,7 +7,7 @@ import numpy as np
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.referee.reference_trajectory import ReferenceTrajectory, adjoint, integrate_controls
 from ocp.referee.stationarity import final_costate, stationarity
-from ocp.referee.violation import drift, violations
+from ocp.referee.violation import invariant_drift, largest_violation
 from ocp.solution.solution import Solution
 
 
@@ -67,15 +67,15 @@ def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
             defect=np.inf,
             truth=truth,
         )
-    worst, violation = max(violations(solution, truth), key=lambda item: item[1])
+    violation = largest_violation(solution, truth)
     own = np.stack([np.interp(solution.t, truth.t, c) for c in truth.x.T], axis=1)
     return Evaluation(
         cost=truth.cost,
         cost_error=truth.cost_error,
-        violation=violation,
-        worst=worst if violation > 0.0 else "",
+        violation=violation.amount,
+        worst=violation.where if violation.amount > 0.0 else "",
         stationarity=stationarity(solution, truth),
-        task_drift=drift(solution, truth),
+        task_drift=invariant_drift(solution, truth),
         defect=float(np.abs(own - solution.x).max()),
         truth=truth,
     )

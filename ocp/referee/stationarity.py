@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ocp.minimum_principle.hamiltonian import hamiltonian
-from ocp.problem.constraint import Constraint, stacked_box
+from ocp.problem.constraint import Box
 from ocp.referee.reference_trajectory import ReferenceTrajectory, adjoint
 from ocp.referee.violation import path_values
 from ocp.solution.solution import Solution
@@ -44,7 +44,7 @@ def stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None
 
 def _path_is_active(solution: Solution, truth: ReferenceTrajectory) -> bool:
     ocp = solution.problem
-    path = stacked_box(ocp.at("path"))
+    path = ocp.rows.path.box
     boxes = [(ocp.state_bounds, truth.x[1:])]
     boxes += [(path, values) for values, _ in path_values(solution, truth)]
     return any(
@@ -116,18 +116,17 @@ def final_costate(solution: Solution, truth: ReferenceTrajectory) -> tuple[np.nd
     phi_x, psi = (np.array(f(*end)) for f in (functions.terminal_gradient, functions.terminal))
     phi_t, psi_x, psi_t = (np.array(v) for v in functions.terminal_slopes(*end))
     target = solution.costate[-1] - phi_x.ravel()
-    nu = _multipliers(solution.problem.at("terminal"), psi.ravel(), psi_x, target)
+    nu = _multipliers(solution.problem.rows.terminal.box, psi.ravel(), psi_x, target)
     return phi_x.ravel() + psi_x.T @ nu, float(phi_t.sum() + nu @ psi_t.ravel())
 
 
 def _multipliers(
-    constraints: tuple[Constraint, ...], value: np.ndarray, jacobian: np.ndarray, target: np.ndarray
+    box: Box, value: np.ndarray, jacobian: np.ndarray, target: np.ndarray
 ) -> np.ndarray:
     """Return the multipliers for which jacobian' nu is nearest to a target.
 
     0 where inactive, at least 0 at an upper bound, at most 0 at a lower one.
     """
-    box = stacked_box(constraints)
     lower, upper = np.asarray(box.lower), np.asarray(box.upper)
     # An equation pulls either way, also where it is missed.
     equation = lower == upper
@@ -149,7 +148,7 @@ def _start_residual(solution: Solution, truth: ReferenceTrajectory, costate: np.
     value, normals = (
         np.array(f(*begin)) for f in (ocp.functions.initial, ocp.functions.initial_slope)
     )
-    mu = _multipliers(ocp.at("initial"), value.ravel(), normals, -costate)
+    mu = _multipliers(ocp.rows.initial.box, value.ravel(), normals, -costate)
     return float(np.abs(costate + normals.T @ mu).max(initial=0.0))
 
 

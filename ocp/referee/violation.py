@@ -4,30 +4,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint_rows import Violation
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 from ocp.solution.solution import Solution
 
-Violation = tuple[str, float]
+
+def largest_violation(solution: Solution, truth: ReferenceTrajectory) -> Violation:
+    """Return the largest violation of any bound or constraint."""
+    return max(_violations(solution, truth), key=lambda violation: violation.amount)
 
 
-def violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:
-    """Yield 'what at which time' and by how much, for every bound and constraint."""
-    ocp, m = solution.problem, solution.problem.model
-    yield from _outside("state", m.x_names, ocp.state_bounds, truth.x, truth.t)
-    for u, t in ((truth.u_start, truth.t[:-1]), (truth.u_end, truth.t[1:])):
-        yield from _outside("control", m.u_names, ocp.control_bounds, u, t)
-    for values, t in path_values(solution, truth):
-        yield from _worst_instants(ocp.at("path"), values, t)
-    functions, p = ocp.functions, solution.data.values
-    first = functions.initial(truth.x[0], truth.t[0], truth.p_start[0])
-    last = functions.terminal(truth.x[-1], truth.t[-1], p.at(1.0)[0])
-    yield from _worst_instants(ocp.at("initial"), np.array(first).T, truth.t[:1])
-    yield from _worst_instants(ocp.at("terminal"), np.array(last).T, truth.t[-1:])
-    yield "final time", float(ocp.time_box.excess(np.array([solution.duration]))[0])
-
-
-def drift(solution: Solution, truth: ReferenceTrajectory) -> float:
+def invariant_drift(solution: Solution, truth: ReferenceTrajectory) -> float:
     """Return the largest violation of the problem's invariants."""
     ocp = solution.problem
     if not ocp.invariants:
@@ -35,7 +22,7 @@ def drift(solution: Solution, truth: ReferenceTrajectory) -> float:
     p = np.vstack([truth.p_start, truth.p_end[-1:]])
     along = ocp.functions.invariants.map(len(truth.t))
     values = np.array(along(truth.x.T, truth.t[None, :], p.T)).T
-    return max(excess for _, excess in _worst_instants(ocp.invariants, values, truth.t))
+    return float(ocp.rows.invariants.excess(values).max(initial=0.0))
 
 
 def path_values(
@@ -54,31 +41,25 @@ def path_values(
     ends = along(truth.x[1:].T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
     at_start, at_end = np.array(starts).T, np.array(ends).T
     if ocp.model.is_discrete:
-        on_control = ocp.functions.path_on_control
+        on_control = ocp.rows.path.on_control
         at_end[:, on_control] = at_start[:, on_control]
     yield at_start, truth.t[:-1]
     yield at_end, truth.t[1:]
 
 
-def _outside(
-    kind: str, names: tuple[str, ...], box: Box, values: np.ndarray, t: np.ndarray
-) -> Iterator[Violation]:
-    excess = box.excess(values)
-    for i, name in enumerate(names):
-        k = int(excess[:, i].argmax())
-        yield f"{kind} {name} at t = {t[k]:.4g} s", float(excess[k, i])
-
-
-def _worst_instants(
-    constraints: tuple[Constraint, ...], values: np.ndarray, t: np.ndarray
-) -> Iterator[Violation]:
-    """Yield the worst instant of each constraint from their stacked values (K, m)."""
-    first = 0
-    for c in constraints:
-        excess = c.box.excess(values[:, first : first + c.size]).max(axis=1, initial=0.0)
-        first += c.size
-        k = int(excess.argmax())
-        if c.at == "path":
-            yield f"constraint '{c.name}' at t = {t[k]:.4g} s", float(excess[k])
-        else:
-            yield f"{c.at} constraint '{c.name}'", float(excess[k])
+def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:
+    """Yield the largest violation of each group of rows."""
+    ocp, rows, t = solution.problem, solution.problem.rows, truth.t
+    yield rows.states.largest_violation(truth.x, t)
+    yield rows.controls.largest_violation(truth.u_start, t[:-1])
+    yield rows.controls.largest_violation(truth.u_end, t[1:])
+    for values, instants in path_values(solution, truth):
+        yield rows.path.largest_violation(values, instants)
+    functions, p = ocp.functions, solution.data.values
+    first = functions.initial(truth.x[0], t[0], truth.p_start[0])
+    last = functions.terminal(truth.x[-1], t[-1], p.at(1.0)[0])
+    yield rows.initial.largest_violation(np.array(first).T, t[:1])
+    yield rows.terminal.largest_violation(np.array(last).T, t[-1:])
+    yield Violation(
+        float(ocp.time_box.excess(np.array([solution.duration]))[0]), rows.time, float(t[-1])
+    )

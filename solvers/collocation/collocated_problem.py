@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ocp import OCP
-from ocp.internal import ConstraintRow, RunData, most_violated, rows_of
+from ocp.internal import ConstraintRow, ConstraintRows, RunData, most_violated
 from solvers.collocation.mesh import CollocationGrid
 
 
@@ -147,12 +147,13 @@ class CollocatedProblem:
     @cached_property
     def _first(self) -> ca.Function:
         """What a free start alone decides of the path constraints."""
-        m, alone = self.ocp.model, ~self.ocp.functions.path_on_control
-        expressions = [e for c in self.ocp.at("path") for e in ca.vertsplit(c.expression)]
-        free = self.ocp.has_free_start
-        wanted = [e for e, is_alone in zip(expressions, alone, strict=True) if is_alone and free]
-        first = ca.vertcat(ca.SX(0, 1), *wanted)
-        return ca.Function("first", [m.x, m.t, self.ocp.p], [first])
+        m = self.ocp.model
+        return ca.Function("first", [m.x, m.t, self.ocp.p], [self._first_rows.expression])
+
+    @cached_property
+    def _first_rows(self) -> ConstraintRows:
+        path = self.ocp.rows.path
+        return path.where(~path.on_control & self.ocp.has_free_start)
 
     @cached_property
     def rows(self) -> tuple[ConstraintRow, ...]:
@@ -163,17 +164,14 @@ class CollocatedProblem:
             for name in ocp.model.x_names
         ]
         time = [ConstraintRow("final time", "time", 0, 0.0, 0.0)] * int(ocp.has_free_time)
-        path = rows_of(ocp.at("path"), "path")
-        on_control = ocp.functions.path_on_control
-        alone = [row for row, depends in zip(path, on_control, strict=True) if not depends]
         blocks = (
             (gap, grid.point_nodes),
             (gap, grid.edge_nodes[1:]),
             (time, grid.edge_nodes[1:]),
-            (path, grid.point_nodes),
-            (rows_of(ocp.at("initial"), "initial"), [0]),
-            (alone if ocp.has_free_start else [], [0]),
-            (rows_of(ocp.at("terminal"), "terminal"), [last]),
+            (ocp.rows.path.rows, grid.point_nodes),
+            (ocp.rows.initial.rows, [0]),
+            (self._first_rows.rows, [0]),
+            (ocp.rows.terminal.rows, [last]),
         )
         return tuple(
             replace(row, node=int(node))

@@ -57,10 +57,10 @@ def _at_the_end(tr: CollocatedProblem, answer: NlpResult, data: RunData) -> np.n
         return np.zeros(ocp.model.nx)
     jump = tr.split(answer.lam_x).x[:, -1]
     rows = np.array([row.place == "path" for row in tr.rows])
-    count = len(ocp.functions.path_on_control)
+    count = len(ocp.rows.path.on_control)
     if not count:
         return jump
-    path = answer.lam_g[rows][: count * len(grid.at)][-count:] * ~ocp.functions.path_on_control
+    path = answer.lam_g[rows][: count * len(grid.at)][-count:] * ~ocp.rows.path.on_control
     parts = tr.split(answer.w)
     u = parts.c[:, grid.owner == grid.mesh.intervals - 1] @ grid.points[-1].B[-1]
     at = (parts.x[:, -1], u, data.t0 + tr.duration(answer.w), data.values.at(1.0, -1)[0])

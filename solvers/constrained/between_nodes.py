@@ -162,7 +162,7 @@ def _tightened(ocp: OCP, rows: StandardForm, intervals: int) -> OCP:
     margin = ca.SX.sym("margin", rows.size)
     shifted = ca.if_else(ca.DM(rows.is_equation.astype(float)), rows.c, rows.c + margin)
     constraints = [c for c in ocp.constraints if c.at != "path"]
-    for name, group in groupby(range(rows.size), key=lambda i: rows.names[i]):
+    for name, group in groupby(range(rows.size), key=lambda i: rows.rows[i].name):
         members = list(group)
         lower = np.where(rows.is_equation[members], 0.0, -np.inf)
         constraints.append(Constraint(name, shifted[members], lower, 0.0))

@@ -1,13 +1,13 @@
 """Constraints and state bounds of a problem, each as a row that must not be positive."""
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Constraint, Evaluation
+from ocp import OCP, Evaluation
+from ocp.internal import ConstraintRow, ConstraintRows, Violation
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,19 +19,17 @@ class StandardForm:
     Attributes:
         ocp: the problem whose symbols the rows are written in.
         c: the rows (m,).
-        is_equation: which of them are equations, bool (m,).
-        names: of the constraint or bound behind each row.
+        rows: what is behind each of them.
     """
 
     ocp: OCP
     c: ca.SX
-    is_equation: np.ndarray
-    names: tuple[str, ...]
+    rows: tuple[ConstraintRow, ...]
 
     @classmethod
     def along(cls, ocp: OCP) -> "StandardForm":
         """Return path constraints and state bounds."""
-        return cls._of(ocp, [*ocp.at("path"), *_bounds(ocp)])
+        return cls._of(ocp, ocp.rows.path + ocp.rows.states)
 
     @classmethod
     def at_end(cls, ocp: OCP) -> "StandardForm":
@@ -40,29 +38,31 @@ class StandardForm:
         A trajectory that is pressed against a bound at the final time needs a multiplier of
         that instant alone: the multiplier of the path has an atom there.
         """
-        along, end = cls.along(ocp), cls._of(ocp, ocp.at("terminal"))
-        free = [i for i in range(along.size) if not ca.depends_on(along.c[i], ocp.model.u)]
-        return cls(
-            ocp,
-            ca.vertcat(end.c, along.c[free]),
-            np.concatenate([end.is_equation, along.is_equation[free]]),
-            (*end.names, *[along.names[i] for i in free]),
-        )
+        path = ocp.rows.path
+        return cls._of(ocp, ocp.rows.terminal + path.where(~path.on_control) + ocp.rows.states)
 
     @classmethod
-    def _of(cls, ocp: OCP, constraints: Iterable[Constraint]) -> "StandardForm":
-        rows = [row for c in constraints for row in _standard_form(c)]
+    def _of(cls, ocp: OCP, rows: ConstraintRows) -> "StandardForm":
+        """Return equations as they are, and every finite side of an inequality as a row."""
+        parts: list[tuple[ca.SX, ConstraintRow]] = []
+        for row, value in zip(rows.rows, ca.vertsplit(rows.expression), strict=True):
+            if np.isfinite(row.lower) and not row.is_equation:
+                parts.append((row.lower - value, row))
+            if np.isfinite(row.upper):
+                parts.append((value - row.upper, row))
         return cls(
-            ocp,
-            ca.vertcat(ca.SX(0, 1), *[c for c, _, _ in rows]),
-            np.array([equation for _, equation, _ in rows], dtype=bool),
-            tuple(name for _, _, name in rows),
+            ocp, ca.vertcat(ca.SX(0, 1), *[c for c, _ in parts]), tuple(row for _, row in parts)
         )
 
     @property
     def size(self) -> int:
         """Number of rows."""
-        return len(self.names)
+        return len(self.rows)
+
+    @cached_property
+    def is_equation(self) -> np.ndarray:
+        """Which of them are equations, bool (m,)."""
+        return np.array([row.is_equation for row in self.rows], dtype=bool)
 
     @cached_property
     def function(self) -> ca.Function:
@@ -93,7 +93,7 @@ class StandardForm:
     def start_violation(self, verdict: Evaluation) -> float:
         """Return by how much the start itself violates rows that no control decides."""
         truth = verdict.truth
-        on_control = np.array(ca.DM(self.function.jac_sparsity(0, 1), 1.0)).any(axis=1)
+        on_control = np.array([row.on_control for row in self.rows], dtype=bool)
         first = self.function(truth.x[0], truth.u_start[0], truth.t[0], truth.p_start[0])
         value = np.array(first).ravel()
         excess = np.where(self.is_equation, np.abs(value), value)[~on_control]
@@ -105,7 +105,7 @@ class StandardForm:
         if excess.max(initial=0.0) <= 0.0:
             return ""
         k, i = np.unravel_index(int(excess.argmax()), excess.shape)
-        return f"'{self.names[i]}' is violated by {excess[k, i]:.3g} at t = {times[k]:.4g} s"
+        return str(Violation(float(excess[k, i]), self.rows[i], float(times[k])))
 
     def at_final(self, verdict: Evaluation) -> np.ndarray:
         """Return the values of the rows at the final time, (m,)."""
@@ -116,21 +116,3 @@ class StandardForm:
     def _worse(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         larger = np.where(self.is_equation, np.abs(a) >= np.abs(b), a >= b)
         return np.where(larger, a, b)
-
-
-def _standard_form(c: Constraint) -> Iterator[tuple[ca.SX, bool, str]]:
-    bounds = zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
-    for row, (lower, upper) in zip(ca.vertsplit(c.expression), bounds, strict=True):
-        if lower == upper:
-            yield row - upper, True, c.name
-            continue
-        if np.isfinite(lower):
-            yield lower - row, False, c.name
-        if np.isfinite(upper):
-            yield row - upper, False, c.name
-
-
-def _bounds(ocp: OCP) -> Iterator[Constraint]:
-    lower, upper = np.asarray(ocp.state_bounds.lower), np.asarray(ocp.state_bounds.upper)
-    for i, name in enumerate(ocp.model.x_names):
-        yield Constraint(f"bound of {name}", ocp.model.x[i], lower[i], upper[i])

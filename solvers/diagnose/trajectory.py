@@ -70,7 +70,7 @@ def _constrained(subject: DiagnosedProblem) -> Iterator[_Row]:
         place: [demand for c in ocp.at(place) for demand, *_ in of_constraint(subject, c)]
         for place in ("path", "initial", "terminal")
     }
-    on_control = ocp.functions.path_on_control
+    on_control = ocp.rows.path.on_control
     late = [d for d, depends in zip(given["path"], on_control, strict=True) if not depends]
     counted: dict[tuple[str, int], int] = {}
     for i, row in enumerate(tr.rows):

@@ -6,8 +6,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Constraint, Integrator, Signal
-from ocp.internal import RunData, Stage
+from ocp import OCP, Integrator, Signal
+from ocp.internal import ConstraintRows, RunData, Stage
 from solvers.tabular.columns import Columns
 from solvers.tabular.state_grid import StateGrid
 
@@ -117,8 +117,8 @@ class Bellman:
         t = np.array([data.t0 + self.ocp.duration])
         cost = self._terminal_cost([x], [t, p])[:, 0]
         met = self._in_state_bounds(x)
-        met &= _met(self._last([x], [t, p]), self._resting)
-        met &= _met(self._terminal([x], [t, p]), self.ocp.at("terminal"), self.slack)
+        met &= _met(self._last([x], [t, p]), self._without_control)
+        met &= _met(self._terminal([x], [t, p]), self.ocp.rows.terminal, self.slack)
         return np.where(met & np.isfinite(cost), cost, np.inf)
 
     def minimum(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -164,9 +164,9 @@ class Bellman:
         """
         stepped = self._step([x, u], common)
         path = self._path([x, u], [common[0], common[2]])
-        counted = self._depends if first else np.ones(len(self._depends), dtype=bool)
-        lower, upper = _bounds(self.ocp.at("path"))
-        met = _within(path[:, counted], lower[counted], upper[counted], 0.0)
+        rows = self.ocp.rows.path
+        counted = rows.on_control | (not first)
+        met = _met(path[:, counted], rows.where(counted))
         if not first:
             met &= self._in_state_bounds(x)
         cost = stepped[:, -1]
@@ -182,8 +182,7 @@ class Bellman:
         return x, np.tile(self.controls.points, (self.grid.size, 1))
 
     def _in_state_bounds(self, x: np.ndarray) -> np.ndarray:
-        box = self.ocp.state_bounds
-        return _within(x, np.asarray(box.lower), np.asarray(box.upper), 0.0)
+        return _met(x, self.ocp.rows.states)
 
     # -- functions, built once --------------------------------------------------------------
 
@@ -210,7 +209,7 @@ class Bellman:
         timely = ca.vertcat(t, p0[kept], p1[kept]) if kept else t
         m = self.ocp.model
         timely_path = ca.vertcat(m.t, self.ocp.p[kept]) if kept else m.t
-        path = ca.vertcat(ca.SX(0, 1), *[c.expression for c in self.ocp.at("path")])
+        path = self.ocp.rows.path.expression
         on_path = path.numel() > 0 and ca.depends_on(path, timely_path)
         return ca.depends_on(after, timely), ca.depends_on(cost, timely) or on_path
 
@@ -222,43 +221,30 @@ class Bellman:
     @cached_property
     def _path(self) -> Columns:
         m = self.ocp.model
-        path = ca.vertcat(ca.SX(0, 1), *[c.expression for c in self.ocp.at("path")])
-        return Columns(ca.Function("path", [m.x, m.u, m.t, self.ocp.p], [ca.densify(path)]), 2)
+        path = ca.densify(self.ocp.rows.path.expression)
+        return Columns(ca.Function("path", [m.x, m.u, m.t, self.ocp.p], [path]), 2)
 
     @cached_property
-    def _depends(self) -> np.ndarray:
-        """Which rows of the path constraints contain a control."""
-        u, rows = self.ocp.model.u, [c.expression for c in self.ocp.at("path")]
-        path = ca.vertcat(ca.SX(0, 1), *rows)
-        return np.array([ca.depends_on(path[i], u) for i in range(path.numel())], dtype=bool)
-
-    @cached_property
-    def _resting(self) -> tuple[Constraint, ...]:
-        """The rows of the path constraints without a control: they hold at the last node too."""
-        rows, i = [], 0
-        for c in self.ocp.at("path"):
-            lower, upper = np.asarray(c.lower), np.asarray(c.upper)
-            for j in range(c.size):
-                if not self._depends[i]:
-                    rows.append(Constraint(c.name, c.expression[j], lower[j], upper[j]))
-                i += 1
-        return tuple(rows)
+    def _without_control(self) -> ConstraintRows:
+        """The path constraints without a control: they hold at the last node too."""
+        path = self.ocp.rows.path
+        return path.where(~path.on_control)
 
     @cached_property
     def _last(self) -> Columns:
-        return self._at_end("last", [c.expression for c in self._resting])
+        return self._at_end("last", self._without_control.expression)
 
     @cached_property
     def _terminal(self) -> Columns:
-        return self._at_end("terminal", [c.expression for c in self.ocp.at("terminal")])
+        return self._at_end("terminal", self.ocp.rows.terminal.expression)
 
     @cached_property
     def _terminal_cost(self) -> Columns:
-        return self._at_end("terminal_cost", [ca.SX(self.ocp.terminal_cost)])
+        return self._at_end("terminal_cost", ca.SX(self.ocp.terminal_cost))
 
-    def _at_end(self, name: str, rows: list[ca.SX]) -> Columns:
-        m, column = self.ocp.model, ca.densify(ca.vertcat(ca.SX(0, 1), *rows))
-        return Columns(ca.Function(name, [m.x, m.t, self.ocp.p], [column]), 1)
+    def _at_end(self, name: str, column: ca.SX) -> Columns:
+        m = self.ocp.model
+        return Columns(ca.Function(name, [m.x, m.t, self.ocp.p], [ca.densify(column)]), 1)
 
 
 def _vertex(
@@ -271,16 +257,9 @@ def _vertex(
     return shift, 0.5 * bend * shift**2
 
 
-def _bounds(constraints: tuple[Constraint, ...]) -> tuple[np.ndarray, np.ndarray]:
-    lower = np.concatenate([[], *[np.asarray(c.lower) for c in constraints]])
-    return lower, np.concatenate([[], *[np.asarray(c.upper) for c in constraints]])
-
-
-def _met(values: np.ndarray, constraints: tuple[Constraint, ...], slack: float = 0.0) -> np.ndarray:
-    return _within(values, *_bounds(constraints), slack)
-
-
-def _within(values: np.ndarray, lower: np.ndarray, upper: np.ndarray, slack: float) -> np.ndarray:
+def _met(values: np.ndarray, rows: ConstraintRows, slack: float = 0.0) -> np.ndarray:
+    """Return which of the points meet all rows, but for rounding and a slack."""
+    lower, upper = np.asarray(rows.box.lower), np.asarray(rows.box.upper)
     low = np.where(np.isfinite(lower), lower - slack - _MET * (1.0 + np.abs(lower)), -np.inf)
     high = np.where(np.isfinite(upper), upper + slack + _MET * (1.0 + np.abs(upper)), np.inf)
     return np.all((values >= low) & (values <= high), axis=1)

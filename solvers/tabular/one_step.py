@@ -6,8 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Box, Constraint
-from ocp.internal import Stage
+from ocp import OCP, Box
+from ocp.internal import ConstraintRows, Stage
 
 # Beyond this a constraint counts as violated, whatever the backend says.
 _VIOLATED = 1e-6
@@ -19,33 +19,30 @@ class OneStep:
 
     Attributes:
         nlp: unknown u; data x, t, h, p0, p1, and t and p after the step.
-        rows: the constraints, of u and data; a backend that gives up returns none of its own.
-        names: what each constraint says.
-        lower: (rows,).
-        upper: (rows,).
+        values: of the constraints, of u and data; a backend that gives up returns none of its own.
+        rows: what each constraint is.
     """
 
     nlp: ca.Function
-    rows: ca.Function
-    names: tuple[str, ...]
-    lower: np.ndarray
-    upper: np.ndarray
+    values: ca.Function
+    rows: ConstraintRows
 
     def solve(
         self, u: np.ndarray, data: np.ndarray, box: Box
     ) -> tuple[np.ndarray, str, dict[str, Any]]:
         """Return the control, which constraint it breaks (or nothing), and the statistics."""
         limits = {"lbx": np.asarray(box.lower), "ubx": np.asarray(box.upper)}
-        answer: Any = self.nlp(x0=u, p=data, lbg=self.lower, ubg=self.upper, **limits)
+        rows = self.rows.box
+        limits |= {"lbg": np.asarray(rows.lower), "ubg": np.asarray(rows.upper)}
+        answer: Any = self.nlp(x0=u, p=data, **limits)
         found = np.array(answer["x"]).ravel()
-        g = np.array(self.rows(found, data)).ravel()
+        g = np.array(self.values(found, data)).ravel()
         stats = self.nlp.stats()
         if not np.isfinite(found).all() or not np.isfinite(g).all():
             return box.clip(u), "a number that is not finite", stats
-        excess = np.maximum(self.lower - g, g - self.upper)
-        if excess.max(initial=0.0) > _VIOLATED * (1.0 + np.abs(g).max(initial=0.0)):
-            worst = int(excess.argmax())
-            return box.clip(found), f"'{self.names[worst]}' by {excess[worst]:.3g}", stats
+        worst = self.rows.largest_violation(g[None, :], np.zeros(1))
+        if worst.amount > _VIOLATED * (1.0 + np.abs(g).max(initial=0.0)):
+            return box.clip(found), f"{worst.row} by {worst.amount:.3g}", stats
         return box.clip(found), "", stats
 
 
@@ -64,47 +61,26 @@ def one_step(ocp: OCP, stage: Stage, options: dict[str, Any], *, last: bool) -> 
         cost = weight * f.running_cost(after, u, s["t_next"], end)
     if last:
         cost += f.terminal_cost(after, s["t_next"], s["p_next"])
-    rows = _Rows()
+    rows = _rows(ocp, last=last)
     path = f.path(s["x"], u, s["t"], s["p0"]), f.path(after, u, s["t_next"], s["p_next"])
-    i = 0
-    for c in ocp.at("path"):
-        for j in range(c.size):
-            here = ca.depends_on(c.expression[j], m.u)
-            rows.add(c, j, path[0 if here else 1][i])
-            i += 1
-    for j, name in enumerate(m.x_names):
-        box = ocp.state_bounds
-        limits = float(np.asarray(box.lower)[j]), float(np.asarray(box.upper)[j])
-        if np.isfinite(limits).any():
-            rows.append(f"bound of {name}", after[j], *limits)
+    imposed = [path[0 if row.on_control else 1][i] for i, row in enumerate(ocp.rows.path.rows)]
+    imposed += [after[j] for j in np.flatnonzero(_bounded(ocp)).tolist()]
     if last:
-        terminal, i = f.terminal(after, s["t_next"], s["p_next"]), 0
-        for c in ocp.at("terminal"):
-            for j in range(c.size):
-                rows.add(c, j, terminal[i])
-                i += 1
+        imposed.append(f.terminal(after, s["t_next"], s["p_next"]))
     data = ca.vertcat(*s.values())
-    g = ca.vertcat(ca.SX(0, 1), *rows.expressions)
+    g = ca.vertcat(ca.SX(0, 1), *imposed)
     nlp = ca.nlpsol("step", "ipopt", {"x": u, "f": cost, "g": g, "p": data}, options)
     function = ca.Function("rows", [u, data], [ca.densify(g)])
-    return OneStep(nlp, function, tuple(rows.names), np.array(rows.lower), np.array(rows.upper))
+    return OneStep(nlp, function, rows)
 
 
-class _Rows:
-    """Constraints being collected."""
+def _rows(ocp: OCP, *, last: bool) -> ConstraintRows:
+    """Return what a step imposes: path constraints, bounds of the next state, and the end."""
+    rows = ocp.rows.path + ocp.rows.states.where(_bounded(ocp))
+    return rows + ocp.rows.terminal if last else rows
 
-    def __init__(self) -> None:
-        self.names: list[str] = []
-        self.expressions: list[ca.SX] = []
-        self.lower: list[float] = []
-        self.upper: list[float] = []
 
-    def add(self, c: Constraint, j: int, expression: ca.SX) -> None:
-        lower, upper = np.asarray(c.lower)[j], np.asarray(c.upper)[j]
-        self.append(c.name, expression, float(lower), float(upper))
-
-    def append(self, name: str, expression: ca.SX, lower: float, upper: float) -> None:
-        self.names.append(name)
-        self.expressions.append(expression)
-        self.lower.append(lower)
-        self.upper.append(upper)
+def _bounded(ocp: OCP) -> np.ndarray:
+    """Return which states have a bound, bool (nx,)."""
+    box = ocp.state_bounds
+    return np.isfinite(box.lower) | np.isfinite(box.upper)

@@ -74,7 +74,7 @@ def test_without_faults_every_decision_is_optimal_and_the_cart_arrives() -> None
         (raises(ZeroDivisionError("as the script says")), "ZeroDivisionError inside the solver"),
         (becomes(Status.FAILED), "FAILED"),
         (becomes(Status.DIVERGED), "DIVERGED"),
-        (leaves_bounds(1e-3), "control u"),
+        (leaves_bounds(1e-3), "bound of u"),
     ],
 )
 def test_a_failure_takes_the_shifted_plan_and_names_itself(change: Change, word: str) -> None:
@@ -197,7 +197,7 @@ def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
 
     bad = loop(controller({0.3: too_fast}))
     assert bad.outcomes[3] is InputSource.SHIFTED
-    assert "speed is violated" in bad.messages[3]
+    assert "'speed' is violated" in bad.messages[3]
 
 
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])

@@ -191,9 +191,9 @@ def test_finds_what_is_violated_between_the_nodes() -> None:
 
 def test_bounds_of_states_and_controls() -> None:
     verdict = evaluate(zigzag(state_bounds=Box(-1.0, 0.1)))
-    assert (verdict.violation, verdict.worst) == (pytest.approx(0.025), "state x at t = 0.25 s")
+    assert (verdict.violation, verdict.worst) == (pytest.approx(0.025), "bound of x at t = 0.25 s")
     verdict = evaluate(zigzag(control_bounds=Box(-0.7, 1.0)))
-    assert (verdict.violation, verdict.worst) == (pytest.approx(0.3), "control u at t = 0.5 s")
+    assert (verdict.violation, verdict.worst) == (pytest.approx(0.3), "bound of u at t = 0.5 s")
 
 
 def test_a_held_control_is_judged_at_the_end_of_its_interval_too() -> None:

@@ -1,0 +1,222 @@
+"""The rows that a problem imposes: what each one is, where it holds, by how much it is violated."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ocp.problem.constraint import Box, Constraint, Place
+from ocp.problem.model import Model
+
+#: An ``"input"`` row limits controls whatever the state is: it can always be met, by whatever acts.
+#: Any other row is ``"hard"``: to meet it may take time, or be impossible.
+RowKind = Literal["hard", "input"]
+
+
+@dataclass(frozen=True)
+class ConstraintRow:
+    """One row, lower <= c(x, u, t, p) <= upper.
+
+    Attributes:
+        name: of the constraint, of a state's dynamics, or of a bound.
+        place: what kind of condition it is.
+        node: where on a grid it holds, 0 to N.
+        lower: least value.
+        upper: largest value.
+        kind: whether it limits controls alone.
+        on_control: whether it depends on a control.
+        label: what a message calls it; default: its name.
+    """
+
+    name: str
+    place: Literal["dynamics", "time"] | Place
+    node: int
+    lower: float
+    upper: float
+    kind: RowKind = "hard"
+    on_control: bool = False
+    label: str = ""
+
+    @property
+    def is_equation(self) -> bool:
+        """Whether the row is an equation."""
+        return self.lower == self.upper
+
+    def __str__(self) -> str:
+        """Return what a message calls it."""
+        return self.label or self.name
+
+
+class Violation(NamedTuple):
+    """By how much a row is violated, and when; 0 and None where nothing is.
+
+    Attributes:
+        amount: distance from the bound, in the unit of the row; inf where it is no number.
+        row: which.
+        t: when [s].
+    """
+
+    amount: float = 0.0
+    row: ConstraintRow | None = None
+    t: float = 0.0
+
+    @property
+    def where(self) -> str:
+        """The row, and when; empty where nothing is violated."""
+        if self.row is None:
+            return ""
+        when = f" at t = {self.t:.4g} s" if self.row.place == "path" else ""
+        return f"{self.row}{when}"
+
+    def __str__(self) -> str:
+        """Return the whole sentence; empty where nothing is violated."""
+        if self.row is None:
+            return ""
+        return f"{self.row} is violated by {self.amount:.3g} at t = {self.t:.4g} s"
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintRows:
+    """Rows that hold together at one instant.
+
+    Attributes:
+        rows: what each one is, (m,).
+        expression: their values, in the symbols of the problem, (m, 1).
+    """
+
+    rows: tuple[ConstraintRow, ...]
+    expression: ca.SX
+
+    @classmethod
+    def of(cls, constraints: Iterable[Constraint], place: Place, model: Model) -> "ConstraintRows":
+        """Return the rows of constraints, one for each component, in their order."""
+        constraints = tuple(constraints)
+        expression = ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])
+        label = "constraint" if place == "path" else f"{place} constraint"
+        on_x, on_u = (_depends(expression, symbols) for symbols in (model.x, model.u))
+        parts = (
+            (c.name, low, high)
+            for c in constraints
+            for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
+        )
+        rows = tuple(
+            ConstraintRow(
+                name=name,
+                place=place,
+                node=0,
+                lower=float(low),
+                upper=float(high),
+                kind="input" if u and not x else "hard",
+                on_control=bool(u),
+                label=f"{label} '{name}'",
+            )
+            for (name, low, high), x, u in zip(parts, on_x, on_u, strict=True)
+        )
+        return cls(rows, expression)
+
+    @classmethod
+    def of_bounds(
+        cls, box: Box, symbols: ca.SX, names: tuple[str, ...], *, kind: RowKind
+    ) -> "ConstraintRows":
+        """Return the bounds of states, or of controls, as rows."""
+        lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+        rows = tuple(
+            ConstraintRow(
+                name=f"bound of {name}",
+                place="path",
+                node=0,
+                lower=float(low),
+                upper=float(high),
+                kind=kind,
+                on_control=kind == "input",
+            )
+            for name, low, high in zip(names, lower, upper, strict=True)
+        )
+        return cls(rows, symbols)
+
+    def __len__(self) -> int:
+        """Return the number of rows m."""
+        return len(self.rows)
+
+    def __add__(self, other: "ConstraintRows") -> "ConstraintRows":
+        """Return the rows of both, these first."""
+        return ConstraintRows(
+            (*self.rows, *other.rows), ca.vertcat(self.expression, other.expression)
+        )
+
+    def where(self, chosen: np.ndarray) -> "ConstraintRows":
+        """Return some of the rows, (m,) of bool says which."""
+        index = np.flatnonzero(chosen).tolist()
+        return ConstraintRows(tuple(self.rows[i] for i in index), self.expression[index, :])
+
+    @cached_property
+    def box(self) -> Box:
+        """Their bounds, each (m,)."""
+        return Box(
+            np.array([row.lower for row in self.rows]), np.array([row.upper for row in self.rows])
+        )
+
+    @cached_property
+    def on_control(self) -> np.ndarray:
+        """Which of them depend on a control, bool (m,)."""
+        return np.array([row.on_control for row in self.rows], dtype=bool)
+
+    @cached_property
+    def is_imposed(self) -> bool:
+        """Whether any of them can be violated at all."""
+        return bool(self.rows) and self.box.is_active
+
+    def excess(self, values: np.ndarray) -> np.ndarray:
+        """Return by how much each value (..., m) lies outside: 0 inside, inf for no number."""
+        return self.box.excess(values)
+
+    def largest_violation(
+        self, values: np.ndarray, t: np.ndarray, *, exempt: np.ndarray | None = None
+    ) -> Violation:
+        """Return the largest violation along a trajectory, the earliest where several are equal.
+
+        Args:
+            values: (K, m).
+            t: instants [s], (K,).
+            exempt: where a row does not hold, bool (K, m).
+        """
+        if not values.size:
+            return Violation()
+        excess = self.excess(values)
+        if exempt is not None:
+            excess[exempt] = 0.0
+        k, i = divmod(int(excess.argmax()), len(self.rows))
+        amount = float(excess[k, i])
+        return Violation(amount, self.rows[i], float(t[k])) if amount > 0.0 else Violation()
+
+
+@dataclass(frozen=True, eq=False)
+class ProblemRows:
+    """All rows of a problem, by where they hold.
+
+    Attributes:
+        states: bounds of the states; at every instant.
+        controls: bounds of the controls; wherever one acts.
+        path: path constraints; those with a control wherever one acts, the others everywhere.
+        initial: at the start.
+        terminal: at the end.
+        invariants: what the exact dynamics keep; no method imposes them.
+        time: the bounds of the duration [s].
+    """
+
+    states: ConstraintRows
+    controls: ConstraintRows
+    path: ConstraintRows
+    initial: ConstraintRows
+    terminal: ConstraintRows
+    invariants: ConstraintRows
+    time: ConstraintRow
+
+
+def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
+    """Return which rows of a column contain any of some symbols, bool (m,)."""
+    structure = np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1.0))
+    return structure.sum(axis=1) > 0.0
