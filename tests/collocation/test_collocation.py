@@ -106,7 +106,7 @@ def test_controls_never_leave_their_bounds(points: Family) -> None:
     for intervals in (5, 12, 15):
         solution = solve(double_integrator_minimum_time(), Collocation(intervals, points=points))
         assert solution.status is Status.SOLVED
-        u = evaluate(solution).truth.u_middle
+        u = evaluate(solution).truth.drive[1]
         assert np.abs(u).max() <= 1.0 + ROUNDING
 
 

@@ -188,9 +188,7 @@ def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(solver: Sol
     program = solver.build(ocp)
     outside = program.run(x0=[0.21])
     assert outside.status is Status.INFEASIBLE
-    assert (
-        outside.message == "bound of x is violated by 0.01 at t = 0 s, by the given start itself"
-    )
+    assert outside.message == "bound of x is violated by 0.01 at t = 0 s, by the given start itself"
     assert ocp.state_bounds.excess(outside.x[1:]).max() < 1e-8
     verdict = evaluate(outside)
     assert verdict.violation == pytest.approx(0.01)
