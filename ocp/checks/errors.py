@@ -14,4 +14,15 @@ class UnsupportedProblem(OCPError, TypeError):
 
 
 class SolverError(OCPError, RuntimeError):
-    """A solution was required (``Solution.or_raise``), but the solver did not reach one."""
+    """A solution was required (``Solution.or_raise``), but the solver did not reach one.
+
+    Args:
+        message: why.
+        result: what was reached instead, with its problem and status: the ``Solution``, or the
+            ``Rollout`` that ended early; None where there is none.
+    """
+
+    def __init__(self, message: str, result: object = None) -> None:
+        """Keep the result."""
+        super().__init__(message)
+        self.result = result

@@ -100,7 +100,7 @@ class Rollout:
     def or_raise(self) -> "Rollout":
         """Return self, or raise ``SolverError`` if the loop ended early."""
         if self.ended:
-            raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}")
+            raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}", self)
         return self
 
     def plot(self) -> "Figure":

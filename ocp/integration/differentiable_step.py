@@ -5,7 +5,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance
 from ocp.integration.one_step import Integrator, Stage
-from ocp.integration.stage_tape import StageTape
+from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.problem.ocp import OCP
 
 # A matrix as its blocks, by the names of what is differentiated, and along what.
@@ -31,11 +31,12 @@ def differentiable_step(ocp: OCP, integrator: Integrator) -> ca.Function:
     step = _again(step, {"is_diff_in": [name in along for name in step.name_in()]})
     adjoint = step.reverse(1)
     s = {name: ca.MX.sym(name, adjoint.sparsity_in(name)) for name in adjoint.name_in()}
-    tape = StageTape.of(
-        ocp, integrator, {name: s[name] for name in step.name_in()}, timed=ocp.has_free_time
-    )
+    given = StageInputs(*[s[name] for name in ("x", "u0", "t", "h", "p0", "p1")])
+    tape = StageTape.of(ocp, integrator, given, timed=ocp.has_free_time)
     ends = np.cumsum([0, *(s[name].numel() for name in along)])
-    first = _blocks({"x_next": tape.along, "cost": tape.gradient}, along, ends)
+    first = _blocks(
+        {"x_next": tape.end.state_jacobian, "cost": tape.end.cost_gradient}, along, ends
+    )
     rows = ca.vertsplit(tape.hessian(s["adj_x_next"], s["adj_cost"]), ends)
     second = _blocks({f"adj_{of}": row for of, row in zip(along, rows, strict=True)}, along, ends)
     second |= {(f"adj_{name}", f"adj_{of}"): block.T for (of, name), block in first.items()}

@@ -4,7 +4,7 @@ import casadi as ca
 
 from ocp.checks.arguments import check_instance
 from ocp.integration.one_step import Integrator
-from ocp.integration.stage_tape import StageTape
+from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.problem.ocp import OCP
 
 
@@ -36,8 +36,9 @@ def stage_hessian(ocp: OCP, integrator: Integrator) -> ca.Function:
     sizes = {"x": m.nx, "u": m.nu, "t": 1, "h": 1, "p0": n_p, "p1": n_p}
     s = {name: ca.MX.sym(name, size) for name, size in sizes.items()}
     costate = ca.MX.sym("costate", m.nx)
-    tape = StageTape.of(ocp, integrator, s)
-    slope = tape.gradient.T + tape.along.T @ costate
-    outputs = [tape.x, tape.cost, tape.along, slope, tape.hessian(costate, ca.MX(1))]
+    tape = StageTape.of(ocp, integrator, StageInputs(**s))
+    end = tape.end
+    slope = end.cost_gradient.T + end.state_jacobian.T @ costate
+    outputs = [end.x, end.cost, end.state_jacobian, slope, tape.hessian(costate, ca.MX(1))]
     names = ["x_next", "cost", "jacobian", "slope", "hessian"]
-    return ca.Function("curvature", [*s.values(), costate], outputs, [*s, "costate"], names)
+    return ca.Function("stage_hessian", [*s.values(), costate], outputs, [*s, "costate"], names)

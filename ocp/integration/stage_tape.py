@@ -1,6 +1,7 @@
 """A held stage, slope by slope: forwards for the Jacobian, backwards for the Hessian."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -37,15 +38,46 @@ class Slope:
         aside = ca.horzcat(ca.SX(m.nx + 1, m.nx), ca.jacobian(g, v))
         blocks = hessian[: m.nx, : m.nx], hessian[m.nx :, : m.nx], hessian[m.nx :, m.nx :]
         return cls(
-            first=_apart("slope", given, [g, ca.jacobian(g, m.x), aside]),
-            second=_apart("bend", [*given, weight], list(blocks)),
+            first=_called("slope", given, [g, ca.jacobian(g, m.x), aside]),
+            second=_called("bend", [*given, weight], list(blocks)),
         )
 
 
-def _apart(name: str, given: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
+def _called(name: str, given: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
     """Return a function that is called; inlined, the slopes would be written out one by one."""
     dense = ca.cse([ca.densify(output) for output in outputs])
     return ca.Function(name, given, dense, {"never_inline": True})
+
+
+class StageInputs(NamedTuple):
+    """State, control, time, step, and the parameters at both ends of a stage."""
+
+    x: ca.MX
+    u: ca.MX
+    t: ca.MX
+    h: ca.MX
+    p0: ca.MX
+    p1: ca.MX
+
+
+class Progress(NamedTuple):
+    """What a stage has come to, with its derivatives along w.
+
+    Attributes:
+        x: state.
+        cost: of the stage.
+        state_jacobian: dx/dw, (nx, nw).
+        cost_gradient: dcost/dw, (1, nw).
+    """
+
+    x: ca.MX
+    cost: ca.MX
+    state_jacobian: ca.MX
+    cost_gradient: ca.MX
+
+    def plus(self, weight: float, move: "Progress") -> "Progress":
+        """Return this plus a weighted slope."""
+        return Progress(*[own + weight * other for own, other in zip(self, move, strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,101 +99,98 @@ class _Visit:
     weight: float
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class StageTape:
-    """State, cost and their Jacobians after the slopes visited so far.
+    """A stage, and every slope that was evaluated on the way.
 
     Attributes:
         slope: of the problem.
-        given: x, u, t, h, p0, p1 of the stage.
-        x: state.
-        cost: of the stage.
-        along: Jacobian of the state in w, (nx, nw).
-        gradient: that of the cost, (1, nw).
+        end: state and cost after the stage, with their Jacobians in w.
+        substeps: the slopes of each.
     """
 
     slope: Slope
-    given: dict[str, ca.MX]
-    substeps: list[list[_Visit]] = field(default_factory=list)
+    end: Progress
+    substeps: tuple[tuple[_Visit, ...], ...]
 
     @classmethod
     def of(
-        cls, ocp: OCP, integrator: Integrator, given: dict[str, ca.MX], *, timed: bool = False
+        cls, ocp: OCP, integrator: Integrator, given: StageInputs, *, timed: bool = False
     ) -> "StageTape":
         """Walk through a stage.
 
         Args:
             ocp: the problem.
             integrator: one-step method.
-            given: x, u, t, h, p0, p1 of the stage, in this order.
+            given: the symbols of the stage.
             timed: whether w is (x, u, t, h) instead of (x, u).
         """
-        tape = cls(Slope.of(ocp, integrator, timed=timed), given)
-        if ocp.model.is_discrete:
-            tape._step_discretely()
-        else:
-            for i in range(integrator.steps):
-                tape._step(integrator, i)
-        return tape
-
-    def __post_init__(self) -> None:
-        """Start at w."""
-        self.nx, (_, self.nw) = self.given["x"].numel(), self.slope.first.size_out(2)
-        self.x, self.cost = self.given["x"], ca.MX(0)
-        self.along = ca.MX(ca.densify(ca.DM.eye(self.nw)[: self.nx, :]))
-        self.gradient = ca.MX.zeros(1, self.nw)
-
-    def _step(self, integrator: Integrator, i: int) -> None:
-        """Walk through one substep of a continuous-time model."""
-        x, along, slope, rise = self.x, self.along, self.x, self.along
-        ends, visits = [self.x, self.along, self.cost, self.gradient], []
-        for k, (reach, weight) in enumerate(integrator.slopes):
-            x = self.x + reach * slope[: self.nx] if k else self.x
-            along = self.along + reach * rise[: self.nx, :] if k else self.along
-            fraction = (i + reach) / integrator.steps
-            visit, slope, rise = self._visit(x, along, fraction, reach=reach, weight=weight)
-            visits.append(visit)
-            moves = slope[: self.nx], rise[: self.nx, :], slope[self.nx], rise[self.nx, :]
-            ends = [end + weight * move for end, move in zip(ends, moves, strict=True)]
-        self.x, self.along, self.cost, self.gradient = ends
-        self.substeps.append(visits)
-
-    def _step_discretely(self) -> None:
-        """Take the one step of a discrete-time model, whose slope is the next state itself."""
-        visit, slope, rise = self._visit(self.x, self.along, 0.0, reach=0.0, weight=1.0)
-        self.substeps.append([visit])
-        self.x, self.along = slope[: self.nx], rise[: self.nx, :]
-        self.cost, self.gradient = slope[self.nx], rise[self.nx, :]
-
-    def _visit(
-        self, x: ca.MX, along: ca.MX, fraction: float, *, reach: float, weight: float
-    ) -> tuple[_Visit, ca.MX, ca.MX]:
-        """Return a slope's place, the slope, and d(slope)/dw."""
-        p0, p1 = self.given["p0"], self.given["p1"]
-        u, t, h = list(self.given.values())[1:4]
-        at = [x, u, t, h, ca.MX(fraction), p0 + fraction * (p1 - p0)]
-        slope, jacobian, aside = self.slope.first.call(at)
-        return _Visit(at, jacobian, along, reach, weight), slope, aside + jacobian @ along
+        slope = Slope.of(ocp, integrator, timed=timed)
+        nx, (_, nw) = ocp.model.nx, slope.first.size_out(2)
+        begin = Progress(
+            given.x, ca.MX(0), ca.MX(ca.densify(ca.DM.eye(nw)[:nx, :])), ca.MX.zeros(1, nw)
+        )
+        if ocp.model.is_discrete:  # one step, whose slope is the next state itself
+            visit, end = _visit(slope, given, begin, 0.0, reach=0.0, weight=1.0)
+            return cls(slope, end, ((visit,),))
+        substeps, end = [], begin
+        for i in range(integrator.steps):
+            visits, end = _substep(slope, given, end, integrator, i)
+            substeps.append(visits)
+        return cls(slope, end, tuple(substeps))
 
     def hessian(self, costate: ca.MX, price: ca.MX) -> ca.MX:
         """Return the second derivative of price times cost + costate'x, (nw, nw).
 
         Goes backwards: the weights of the slopes are the adjoint of the step.
         """
-        nx, nw = self.nx, self.nw
+        nx, nw = self.end.state_jacobian.shape
         hessian, mixed = ca.MX.zeros(nw, nw), ca.MX.zeros(nw - nx, nw)
         own = ca.MX.zeros(nw - nx, nw - nx)
         for visits in reversed(self.substeps):
             before = costate
-            pull = ca.MX.zeros(nx)  # of the slope behind on this one
+            from_next = ca.MX.zeros(nx)  # the part of the adjoint that the next slope adds
             for visit in reversed(visits):
-                weight = ca.vertcat(visit.weight * costate + pull, visit.weight * price)
+                weight = ca.vertcat(visit.weight * costate + from_next, visit.weight * price)
                 # Z' H Z of the slope, with Z = (dx_i/dw; dv/dw).
                 xx, vx, vv = self.slope.second.call([*visit.at, weight])
                 hessian += visit.along.T @ (xx @ visit.along)
                 mixed, own = mixed + vx @ visit.along, own + vv
                 back = visit.jacobian.T @ weight
-                before, pull = before + back, visit.reach * back
+                before, from_next = before + back, visit.reach * back
             costate = before
         mixed = ca.vertcat(ca.MX.zeros(nx, nw), mixed)
         return hessian + mixed + mixed.T + ca.densify(ca.diagcat(ca.MX(nx, nx), own))
+
+
+def _substep(
+    slope: Slope, given: StageInputs, begin: Progress, integrator: Integrator, i: int
+) -> tuple[tuple[_Visit, ...], Progress]:
+    """Walk through one substep of a continuous-time model."""
+    end, before, visits = begin, begin, []
+    for k, (reach, weight) in enumerate(integrator.slopes):
+        here = begin.plus(reach, before) if k else begin
+        fraction = (i + reach) / integrator.steps
+        visit, before = _visit(slope, given, here, fraction, reach=reach, weight=weight)
+        visits.append(visit)
+        end = end.plus(weight, before)
+    return tuple(visits), end
+
+
+def _visit(
+    slope: Slope,
+    given: StageInputs,
+    here: Progress,
+    fraction: float,
+    *,
+    reach: float,
+    weight: float,
+) -> tuple[_Visit, Progress]:
+    """Evaluate a slope; return where that was, and the slope of everything in ``Progress``."""
+    p = given.p0 + fraction * (given.p1 - given.p0)
+    at = [here.x, given.u, given.t, given.h, ca.MX(fraction), p]
+    value, jacobian, aside = slope.first.call(at)
+    rise = aside + jacobian @ here.state_jacobian
+    nx = here.x.numel()
+    move = Progress(value[:nx], value[nx], rise[:nx, :], rise[nx, :])
+    return _Visit(at, jacobian, here.state_jacobian, reach, weight), move

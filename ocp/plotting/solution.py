@@ -1,17 +1,21 @@
-"""What people look at: states, controls, costates and constraints over time."""
+"""Figure of a solution: states, controls, costates and constraints over time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from ocp.problem.constraint import Box
 from ocp.problem.constraint_rows import ConstraintRows
-from ocp.solution.solution import Solution
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
 
 # Lines beyond this many take their colours from a continuous map and share a wide legend.
 _FEW = 8
@@ -19,6 +23,62 @@ _LEGEND_ROWS = 12
 _POINTS = 600
 # Lines that vary by less are drawn with their bounds, wherever these are.
 _FLAT = 1e-9
+
+
+class PlottableSolution(Protocol):
+    """What of a ``Solution`` is drawn: its own file, whose method this is, is built on this one."""
+
+    @property
+    def problem(self) -> OCP:
+        """The problem."""
+        ...
+
+    @property
+    def status(self) -> Enum:
+        """How the solve ended."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """The solver's own."""
+        ...
+
+    @property
+    def t(self) -> np.ndarray:
+        """Nodes [s], (N + 1,)."""
+        ...
+
+    @property
+    def u(self) -> np.ndarray:
+        """Controls."""
+        ...
+
+    @property
+    def control_kind(self) -> str:
+        """What they are between the nodes."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        ...
+
+    @property
+    def data(self) -> RunData:
+        """The numbers of the run."""
+        ...
+
+    def state(self, t: ArrayLike) -> np.ndarray:
+        """States at time(s) t [s]."""
+        ...
+
+    def control(self, t: ArrayLike) -> np.ndarray:
+        """Controls at time(s) t [s]."""
+        ...
+
+    def costate_at(self, t: ArrayLike) -> np.ndarray:
+        """Costates at time(s) t [s]."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +100,7 @@ class _Panel:
         return len(self.values) < len(self.t)
 
 
-def plot_solution(solution: Solution) -> Figure:
+def plot_solution(solution: PlottableSolution) -> Figure:
     """Return a figure of a solution; save it with ``figure.savefig``.
 
     States, controls, costates, and where the problem has them path constraints and
@@ -74,45 +134,45 @@ def plot_solution(solution: Solution) -> Figure:
 # -- what is drawn --------------------------------------------------------------------
 
 
-def _instants(solution: Solution) -> np.ndarray:
+def _instants(solution: PlottableSolution) -> np.ndarray:
     """The nodes, and for controls that are curved between them many instants more."""
     if solution.control_kind not in ("extremal", "polynomial"):
         return solution.t
     return np.union1d(solution.t, np.linspace(solution.t[0], solution.t[-1], _POINTS))
 
 
-def _states(solution: Solution) -> _Panel:
+def _states(solution: PlottableSolution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     m = ocp.model
     return _Panel("states", m.x_names, m.x_units, t, solution.state(t), ocp.state_bounds)
 
 
-def _controls(solution: Solution) -> _Panel:
+def _controls(solution: PlottableSolution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     m = ocp.model
     u = solution.u if solution.control_kind == "held" else solution.control(t)
     return _Panel("controls", m.u_names, m.u_units, t, u, ocp.control_bounds)
 
 
-def _costates(solution: Solution) -> _Panel:
+def _costates(solution: PlottableSolution) -> _Panel:
     names = tuple(f"∂J/∂({name})" for name in solution.problem.model.x_names)
     t = _instants(solution)
     return _Panel("costates", names, (), t, solution.costate_at(t))
 
 
-def _path(solution: Solution) -> _Panel:
+def _path(solution: PlottableSolution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), solution.control(t), t[:, None], _parameters(solution, t)]
     return _constraints("path constraints", ocp.rows.path, ocp.functions.path, given, t)
 
 
-def _invariants(solution: Solution) -> _Panel:
+def _invariants(solution: PlottableSolution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), t[:, None], _parameters(solution, t)]
     return _constraints("invariants", ocp.rows.invariants, ocp.functions.invariants, given, t)
 
 
-def _parameters(solution: Solution, t: np.ndarray) -> np.ndarray:
+def _parameters(solution: PlottableSolution, t: np.ndarray) -> np.ndarray:
     return solution.data.values.at((t - solution.t[0]) / solution.duration)
 
 
@@ -136,7 +196,7 @@ def _row_names(rows: ConstraintRows) -> tuple[str, ...]:
     return tuple(found)
 
 
-_PANELS: tuple[Callable[[Solution], _Panel], ...] = (
+_PANELS: tuple[Callable[[PlottableSolution], _Panel], ...] = (
     _states,
     _controls,
     _costates,

@@ -171,7 +171,7 @@ class Solution:
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
         if not self.status.is_success:
             said = f"{self.solver}: {self.status.value}. {self.message}".strip()
-            raise SolverError(f"{said}{self._hint}")
+            raise SolverError(f"{said}{self._hint}", self)
         return self
 
     def with_(self, **changes: Any) -> "Solution":
@@ -256,9 +256,8 @@ class Solution:
 
     def plot(self) -> "Figure":
         """Return a figure of states, controls, costates and constraints over time."""
-        from ocp.plotting.solution import (
-            plot_solution,
-        )  # matplotlib takes a second: only who plots waits
+        # matplotlib takes a second to import: only who plots waits
+        from ocp.plotting.solution import plot_solution
 
         return plot_solution(self)
 
