@@ -26,7 +26,7 @@ install: $(STAMP) ## make .venv, with the package in editable mode and all extra
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python $(PIP) install --quiet -c constraints.txt -e '.[test,docs]'
+	$(BIN)/python $(PIP) install --quiet -c constraints.txt -e '.[benchmarks,test,docs]'
 	touch $@
 
 bench: $(STAMP) ## run the main job: all methods on the arm, a table and a picture
@@ -50,7 +50,7 @@ quick: $(STAMP) ## the tests that are not slow, without coverage
 constraints: ## renew constraints.txt from the newest versions (run `make test` afterwards)
 	rm -rf build/fresh
 	$(PYTHON) -m venv build/fresh
-	build/fresh/bin/python $(PIP) install --quiet -e '.[test,docs]'
+	build/fresh/bin/python $(PIP) install --quiet -e '.[benchmarks,test,docs]'
 	sed -n '/^#/p' constraints.txt > build/constraints.txt
 	build/fresh/bin/python $(PIP) list --format=freeze --exclude-editable \
 		--exclude pip --exclude setuptools >> build/constraints.txt

@@ -44,6 +44,24 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.module or ""
 
 
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def modules_of(path: Path) -> Iterator[str]:
+    """Everything a file imports, down to the file that is meant."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            inside = [f"{node.module}.{alias.name}" for alias in node.names]
+            is_module = [
+                ROOT.joinpath(*name.split(".")).with_suffix(".py").exists() for name in inside
+            ]
+            yield from (name for name, found in zip(inside, is_module, strict=True) if found)
+            if not all(is_module):
+                yield node.module
+
+
 every_file = pytest.mark.parametrize("path", sources(*PACKAGES), ids=named)
 library_file = pytest.mark.parametrize("path", sources(*LIBRARIES), ids=named)
 
@@ -58,6 +76,23 @@ def test_imports_follow_the_layers_and_use_the_entrances(path: Path) -> None:
         where = f"{named(path)}:{line}: {module}"
         assert package in MAY_IMPORT[own], f"{where}: {own} does not know {package}"
         assert module in ENTRANCES, f"{where}: across packages import from {sorted(ENTRANCES)}"
+
+
+def test_no_file_imports_itself_by_way_of_others() -> None:
+    """No circle among the files of a package, imports inside functions included."""
+    known = {module_name(path): path for path in sources(*PACKAGES)}
+    imported = {name: set(modules_of(path)) & set(known) for name, path in known.items()}
+    done: set[str] = set()
+
+    def visit(name: str, way: tuple[str, ...]) -> None:
+        assert name not in way, f"a circle: {' -> '.join((*way, name))}"
+        if name not in done:
+            for other in imported[name]:
+                visit(other, (*way, name))
+            done.add(name)
+
+    for name in known:
+        visit(name, ())
 
 
 @library_file
