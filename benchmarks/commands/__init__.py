@@ -10,6 +10,7 @@ from benchmarks.commands.loops import FAULTS, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
 from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
+from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
 from benchmarks.commands.speed import ARM_SPEED, SPEED
 
@@ -28,6 +29,7 @@ COMMANDS: tuple[Command, ...] = (
     FAULTS,
     MISTAKES_COMMAND,
     PEERS_COMMAND,
+    ROOMS,
 )
 
 __all__ = ["COMMANDS", "Command"]

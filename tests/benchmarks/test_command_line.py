@@ -1,5 +1,7 @@
 """The command line, as a stranger types it."""
 
+from pathlib import Path
+
 import pytest
 
 from benchmarks.__main__ import main
@@ -7,7 +9,10 @@ from benchmarks.cases import all_cases
 from benchmarks.commands.bench import BENCH_CASES, BENCH_METHODS
 from benchmarks.methods.every import all_methods
 from benchmarks.pictures.main_job import bench_picture
+from benchmarks.pictures.rooms import rooms
 from benchmarks.sweep.row import RESULTS
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_list_names_every_suite_and_solver(capsys):
@@ -27,6 +32,16 @@ def test_run_prints_a_table_and_returns_0_where_all_claims_hold(tmp_path, capsys
 def test_bench_names_cases_and_methods_that_exist():
     assert set(BENCH_CASES) <= {case.name for case in all_cases()}
     assert set(BENCH_METHODS) <= {method.name for method in all_methods()}
+
+
+def test_rooms_are_those_of_the_packages(tmp_path, capsys):
+    assert main(["rooms", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    for package in ("ocp", "solvers", "benchmarks"):
+        folders = {p.parent.name for p in ROOT.joinpath(package).glob("*/__init__.py")}
+        assert folders <= {room.name for room in rooms() if room.package == package}
+    assert all(room.about and room.name in shown for room in rooms())
+    assert (tmp_path / "rooms.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_nothing_to_run_is_said_and_is_no_success(tmp_path, capsys):
