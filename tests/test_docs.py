@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -37,3 +38,14 @@ def test_files_and_links_exist(page: Path) -> None:
 def test_commands_parse(page: Path) -> None:
     for words in COMMAND.findall(page.read_text(encoding="utf-8")):
         _parser().parse_args(shlex.split(words))  # ends the process where it does not know one
+
+
+@pytest.mark.parametrize("package", ["ocp", "solvers", "models"])
+def test_the_api_page_has_every_name_once(package: str) -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    named = []
+    for block in page.split(".. currentmodule:: ")[1:]:
+        module, _, rest = block.partition("\n")
+        if module == package:
+            named += re.findall(r"^\.\. auto\w+:: (\w+)$", rest.split("```")[0], re.MULTILINE)
+    assert sorted(named) == sorted(import_module(package).__all__)
