@@ -46,7 +46,7 @@ class Collocation(Solver):
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted error of a state, relative to 1 + abs(x): by how much the
-            dynamics, integrated from node to node, miss the polynomial; an answer beyond it is
+            dynamics, integrated from node to node, miss the polynomial; a solution beyond it is
             ``INACCURATE``. ``refined`` finds a mesh that meets it.
         verbose: let the backend print.
         time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in

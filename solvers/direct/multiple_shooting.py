@@ -30,7 +30,7 @@ class MultipleShooting(Solver):
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
-            interval is halved; an answer beyond it is ``INACCURATE``.
+            interval is halved; a solution beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
         time_limit: for each run of the backend, of which a solve may take three [s]; inf:

@@ -99,8 +99,8 @@ class StepSlopes(NamedTuple):
 
 def evaluate_stages(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> ca.Function:
     """Return the function of (x, u, costate, t, h, p0, p1, p_final) to a ``StageEvaluation``."""
-    nx, nu, s = ocp.model.nx, ocp.model.nu, _symbols(ocp, n)
-    x, costate, last_first = s["x"], s["costate"], _last_first(n)
+    nu, s, last_first = ocp.model.nu, _symbols(ocp, n), _last_first(n)
+    x, costate = s["x"], s["costate"]
     stage = stage_hessian(ocp, integrator)
     stage = compiled(stage) if fast else stage
     inputs = [x[:, :-1], *[s[name] for name in ("u", "t", "h", "p0", "p1")], costate[:, 1:]]
@@ -111,23 +111,6 @@ def evaluate_stages(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> 
     gradient = gradient - ca.vertcat(costate[:, :-1][:, last_first], ca.MX.zeros(nu, n))
     end_cost, end_gradient, end_hessian = _end(ocp)(x[:, -1], s["t"][-1] + s["h"][-1], s["p_final"])
     end_gradient = end_gradient - costate[:, -1]
-    control_gradient = gradient[nx:, last_first]
-    largest = ca.norm_inf(ca.vec(costate))
-    bounds = ocp.control_bounds
-    projected = control_gradient
-    if bounds.is_active:
-        projected = _projected_gradient(s["u"], control_gradient, 1 + largest, bounds)
-    measures = {
-        "cost": ca.sum2(cost) + end_cost,
-        "defect_norm1": ca.norm_1(ca.vec(defects)),
-        # Norms of squares: CasADi's largest element ignores NaN.
-        "defect_norm2": ca.norm_2(ca.vec(defects)),
-        "gradient_norm": ca.norm_2(
-            ca.vertcat(ca.vec(gradient[:nx, :]), ca.vec(projected), end_gradient)
-        ),
-        "largest_costate": largest,
-        "hessian_norm": ca.norm_inf(ca.vec(hessian[nx:, :])),
-    }
     outputs = {
         "jacobian": jacobian,
         "gradient": gradient,
@@ -135,12 +118,32 @@ def evaluate_stages(ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> 
         "end_gradient": end_gradient,
         "end_hessian": end_hessian,
         "defects": defects,
-        "control_gradient": control_gradient,
-        "measures": ca.vertcat(*_ordered(measures, Measures._fields)),
+        "control_gradient": gradient[ocp.model.nx :, last_first],
     }
+    outputs["measures"] = _measures(ocp, s["u"], costate, ca.sum2(cost) + end_cost, outputs)
     names = ("x", "u", "costate", "t", "h", "p0", "p1", "p_final")
     results = _ordered(outputs, StageEvaluation._fields)
     return ca.Function("evaluate_stages", [s[name] for name in names], results)
+
+
+def _measures(ocp: OCP, u: ca.MX, costate: ca.MX, cost: ca.MX, stages: dict[str, ca.MX]) -> ca.MX:
+    """Return the numbers of ``Measures`` (6, 1) from the other outputs of ``evaluate_stages``."""
+    nx, bounds = ocp.model.nx, ocp.control_bounds
+    defects, projected = ca.vec(stages["defects"]), stages["control_gradient"]
+    largest = ca.norm_inf(ca.vec(costate))
+    if bounds.is_active:
+        projected = _projected_gradient(u, projected, 1 + largest, bounds)
+    gradient = [ca.vec(stages["gradient"][:nx, :]), ca.vec(projected), stages["end_gradient"]]
+    measures = {
+        "cost": cost,
+        "defect_norm1": ca.norm_1(defects),
+        # Norms of squares: CasADi's largest element ignores NaN.
+        "defect_norm2": ca.norm_2(defects),
+        "gradient_norm": ca.norm_2(ca.vertcat(*gradient)),
+        "largest_costate": largest,
+        "hessian_norm": ca.norm_inf(ca.vec(stages["hessian"][nx:, :])),
+    }
+    return ca.vertcat(*_ordered(measures, Measures._fields))
 
 
 def riccati_solve(ocp: OCP, n: int, *, fast: bool) -> ca.Function:

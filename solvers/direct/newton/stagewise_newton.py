@@ -57,7 +57,7 @@ class StagewiseNewton(Solver):
             bounds, where that is less than one.
         max_iterations: most Newton steps.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
-            interval is halved; an answer beyond it is ``INACCURATE``.
+            interval is halved; a solution beyond it is ``INACCURATE``.
         compiled: run stages and recursion as machine code; the first build takes seconds, see
             ``compiled``.
     """
