@@ -1,6 +1,7 @@
 """An iterate, its linearisation, and the Newton step from it within the bounds of the controls."""
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import ClassVar
 
 import numpy as np
@@ -60,7 +61,7 @@ class Linearisation:
     def is_finite(self) -> bool:
         """Whether cost, defects and gradient are finite."""
         m = self.measures
-        return bool(np.isfinite([m.cost, m.defect_norm1, m.gradient_norm]).all())
+        return isfinite(m.cost) and isfinite(m.defect_norm1) and isfinite(m.gradient_norm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +89,8 @@ class NewtonDirection:
     @property
     def is_convex(self) -> bool:
         """Whether the model has a minimum among the free controls, and the step leads there."""
-        curvature = self.slopes.directional_curvature
-        return bool(self.pivots.min() > self.definite) and bool(np.isfinite(curvature))
+        is_definite = bool(self.pivots.min() > self.definite)
+        return is_definite and isfinite(self.slopes.directional_curvature)
 
 
 @dataclass(frozen=True, eq=False)
