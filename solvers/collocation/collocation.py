@@ -9,31 +9,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, Program, Solution, Solver, UnsupportedProblem
-from ocp.internal import RunData, check_instance, check_positive, elevated
+from ocp.internal import RunData, check_instance, check_positive, check_whole, elevated
 from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
 from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
 from solvers.collocation.defects import Defects
 from solvers.collocation.mesh import CollocationGrid, Mesh
-from solvers.direct.nlp_backends import NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 
 
 @dataclass(frozen=True)
 class Collocation(Solver):
-    r"""States and controls as polynomials on each interval, the dynamics met at points of theirs.
+    r"""States and controls are polynomials on each interval; the dynamics hold at its points.
 
     With d points an interval states have degree d and controls d - 1, continuous states and
     discontinuous controls. On smooth problems states, costates and cost at the interval ends
     are of order 2d - 1 (Radau) and 2d (Gauss) in the interval's length.
 
-    What holds where: dynamics, path constraints and state bounds at the collocation points, which
-    are inside the intervals and with Radau their ends as well. So with Gauss' the final state is
-    bound by terminal constraints alone, and with neither does a path constraint with the control
-    hold at t0. A start that is given and violates a path constraint is ``INFEASIBLE``; one
-    that is free obeys state bounds and path constraints without control. Bounds of the control
-    hold everywhere: it is a combination, convex at each instant, of coefficients within them.
-    Signals are read at the points; where they have kinks or jumps, let edges be.
+    Dynamics, path constraints and state bounds hold at the collocation points: inside each
+    interval, and with Radau also at its end. So with Gauss only terminal constraints restrict
+    the final state, and with neither does a path constraint that contains the control hold at t0.
+    A given start that violates a path constraint is ``INFEASIBLE``; a free one meets the state
+    bounds and the path constraints without control. Control bounds hold everywhere: the control
+    is at each instant a convex combination of coefficients within them. Signals are read at the
+    points; put mesh edges where they have kinks or jumps.
 
     Source: [Hager 2000; Benson et al. 2006; Garg et al. 2010]; backend [Waechter & Biegler 2006].
 
@@ -46,7 +46,7 @@ class Collocation(Solver):
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted error of a state, relative to 1 + abs(x): by how much the
-            dynamics, integrated from node to node, miss the polynomial; an answer beyond it is
+            dynamics, integrated from node to node, miss the polynomial; a solution beyond it is
             ``INACCURATE``. ``refined`` finds a mesh that meets it.
         verbose: let the backend print.
         time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in
@@ -66,11 +66,12 @@ class Collocation(Solver):
     def __post_init__(self) -> None:
         """Check the options."""
         CollocationPoints.of(self.points, self.degree)
-        if self.mesh is not None:
+        if self.mesh is None:
+            check_whole(self.intervals, "mesh: intervals")
+        else:
             check_instance(self.mesh, Mesh, "collocation: mesh")
-        self.chosen_mesh  # noqa: B018 - checks its own
         check_positive(self.accuracy, "collocation: accuracy", finite=False)
-        self.options  # noqa: B018 - checks its own
+        self.nlp_backend.check()
 
     @property
     def chosen_mesh(self) -> Mesh:
@@ -78,7 +79,7 @@ class Collocation(Solver):
         return self.mesh or Mesh.uniform(self.intervals, self.degree)
 
     @property
-    def options(self) -> NlpBackend:
+    def nlp_backend(self) -> NlpBackend:
         """The backend with its options."""
         return NlpBackend(
             tolerance=self.tolerance,
@@ -99,9 +100,9 @@ class Collocation(Solver):
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
             )
         grid = CollocationGrid.of(self.chosen_mesh, self.points)
-        program = CollocationProgram(self, CollocatedProblem(ocp, grid), Defects.of(ocp, grid))
-        program.search.nlp  # noqa: B018 - all symbolic work is done here
-        return program
+        transcription = CollocatedProblem(ocp, grid)
+        nlp = self.nlp_backend.build(transcription)
+        return CollocationProgram(self, transcription, Defects.of(ocp, grid), nlp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +113,13 @@ class CollocationProgram(Program):
         solver: the options.
         transcription: the problem on its points.
         gaps: the dynamics between the nodes.
+        nlp: the backend, set up.
     """
 
     solver: Collocation
     transcription: CollocatedProblem
     gaps: Defects
+    nlp: Nlp
 
     def run(
         self,
@@ -126,18 +129,17 @@ class CollocationProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Solve for these data; where that fails, look for a trajectory that is feasible."""
+        """Solve for these data, in the phases of ``NlpRun``."""
         started, ocp = perf_counter(), self.transcription.ocp
         data = RunData.of(ocp, x0, t0, parameters)
         first = self._first_iterate(data, ocp.first_guess(guess))
-        found = self.search.solve(first.joined(), data)
-        return self._solution(data, found, perf_counter() - started)
+        outcome = self._nlp_run.solve(first.joined(), data)
+        return self._solution(data, outcome, perf_counter() - started)
 
     @cached_property
-    def search(self) -> NlpRun:
-        """The backend, and what is done around it."""
-        solver = self.solver
-        return NlpRun(self.transcription, solver.options, solver.accuracy, self._error)
+    def _nlp_run(self) -> NlpRun:
+        """Kept, since it keeps the elastic problem of the feasibility restoration."""
+        return NlpRun(self.transcription, self.nlp, self.solver.accuracy, self._state_error)
 
     # -- the first iterate -------------------------------------------------------------------
 
@@ -172,10 +174,11 @@ class CollocationProgram(Program):
         parts = [elevated(c[grid.owner == k], most) for k in range(grid.mesh.intervals)]
         return np.vstack(parts)
 
-    # -- the answer --------------------------------------------------------------------------
+    # -- the result --------------------------------------------------------------------------
 
-    def _error(self, answer: NlpResult, data: RunData) -> tuple[float, int]:
-        w, tr = answer.w, self.transcription
+    def _state_error(self, result: NlpResult, data: RunData) -> tuple[float, int]:
+        """By how much the integrated dynamics miss a node, relative to 1 + abs(x), and which."""
+        w, tr = result.w, self.transcription
         u = self._elevated(tr.split(w).c.T)
         moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
         worst = int(moved.argmax())
@@ -190,25 +193,26 @@ class CollocationProgram(Program):
         x[grid.point_nodes] = parts.x.T  # within the state bounds, at the edges as well
         return x
 
-    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
-        tr, answer = self.transcription, found.last
+    def _solution(self, data: RunData, outcome: NlpOutcome, seconds: float) -> Solution:
+        """The last result, with the work of all runs."""
+        tr, result = self.transcription, outcome.last
         return Solution(
             problem=tr.ocp,
             solver=repr(self.solver),
-            status=found.status,
-            message=found.message,
-            t=self.search.times(answer, data),
-            x=self._states(answer.w),
+            status=outcome.status,
+            message=outcome.message,
+            t=self._nlp_run.times(result, data),
+            x=self._states(result.w),
             x0=data.x0,
-            costate=costates(tr, answer, data),
-            u=self._elevated(tr.split(answer.w).c.T),
+            costate=costates(tr, result, data),
+            u=self._elevated(tr.split(result.w).c.T),
             control_kind="polynomial",
             breaks=tr.grid.edge_nodes,
-            cost=answer.cost,
-            residual=found.residual,
-            iterations=found.iterations,
-            work=found.work,
-            history=found.history(),
+            cost=result.cost,
+            residual=outcome.residual,
+            iterations=outcome.iterations,
+            work=outcome.work,
+            history=outcome.history(),
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )

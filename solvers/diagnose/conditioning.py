@@ -82,7 +82,7 @@ def _matrix(subject: DiagnosedProblem, w: np.ndarray, free: np.ndarray) -> np.nd
     """K, from the functions that the backend has built anyway."""
     tr = subject.program.transcription
     p, bounds = tr.data_vector(subject.data), tr.bounds(subject.data)
-    nlp = subject.program.search.nlp.function
+    nlp = subject.program.nlp.function
     slope = np.array(nlp.get_function("nlp_grad_f")(w, p)[1]).ravel()[free]
     g, jacobian = (np.array(a) for a in nlp.get_function("nlp_jac_g")(w, p))
     on = _active(g.ravel(), bounds["lbg"], bounds["ubg"])

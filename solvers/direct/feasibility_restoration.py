@@ -1,4 +1,4 @@
-"""Can the constraints be met at all? The smallest largest violation near a trajectory."""
+"""Feasibility restoration: the trajectory whose largest constraint violation is smallest."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,8 +10,23 @@ from ocp.internal import ConstraintRow
 from solvers.direct.nlp_backends import NlpResult
 from solvers.direct.transcribed_problem import TranscribedProblem
 
-# The cost, scaled by this, only picks one among the least violating trajectories.
+# Weight of the cost, which only selects one among the least violating trajectories.
 _TIE_BREAK = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LeastViolation:
+    """A trajectory that violates the constraints as little as possible, near a first iterate.
+
+    Attributes:
+        result: the trajectory, with its cost and without multipliers.
+        violation: the largest one that is left.
+        row: what is violated by that much; None: nothing is.
+    """
+
+    result: NlpResult
+    violation: float
+    row: ConstraintRow | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,13 +36,13 @@ class FeasibilityRestoration:
     .. math:: \min_{w,\, s \ge 0} s \quad \text{s.t.} \quad
               \text{lower} - s \le g_i(w) \le \text{upper} + s
 
-    for the path and terminal constraints and the state bounds, while the dynamics, the
-    start and the control bounds hold as they are. A local answer: what it calls infeasible is
-    infeasible near where it looked.
+    for the path and terminal constraints and the state bounds; dynamics, start and control
+    bounds are not relaxed. The solution is a local one: if s > 0 there the problem is
+    infeasible near that trajectory.
 
     Attributes:
         transcription: the problem on its grid.
-        time_limit: for a search [s].
+        time_limit: for one solve [s].
     """
 
     transcription: TranscribedProblem
@@ -35,15 +50,17 @@ class FeasibilityRestoration:
 
     @cached_property
     def _soft(self) -> np.ndarray:
+        """Whether a constraint is relaxed, bool (m,)."""
         return np.array([r.place in ("path", "terminal") for r in self.transcription.rows])
 
     @cached_property
     def _states(self) -> np.ndarray:
-        """Whether an unknown is a state that may leave its bounds; the start may not."""
+        """Whether the bounds of an unknown are relaxed, bool (size,): states after the start."""
         return self.transcription.is_later_state
 
     @cached_property
     def _nlp(self) -> ca.Function:
+        """The elastic problem with its solver; built at the first use, which is rare."""
         program = self.transcription.program
         w, g, s = program["x"], program["g"], ca.MX.sym("s")
         soft, states = (
@@ -66,13 +83,13 @@ class FeasibilityRestoration:
 
     def least_violating(
         self, w0: np.ndarray, bounds: dict[str, np.ndarray], p: np.ndarray
-    ) -> tuple[NlpResult, float, ConstraintRow | None] | None:
-        """Return the answer, the violation that is left and where; None if nothing was found.
+    ) -> LeastViolation | None:
+        """Solve the elastic problem; None if that fails.
 
         Args:
             w0: first iterate.
-            bounds: of the problem itself.
-            p: its data.
+            bounds: of the problem itself: lbx, ubx, lbg, ubg.
+            p: data of the problem.
         """
         soft, states = self._soft, self._states
         inf_soft, inf_states = np.full(soft.sum(), np.inf), np.full(states.sum(), np.inf)
@@ -80,7 +97,7 @@ class FeasibilityRestoration:
         ubg = [bounds["ubg"][~soft], inf_soft, bounds["ubg"][soft]]
         lbg += [bounds["lbx"][states], -inf_states]
         ubg += [inf_states, bounds["ubx"][states]]
-        answer = self._nlp(
+        solution = self._nlp(
             x0=np.append(w0, 1.0),
             p=p,
             lbx=np.append(np.where(states, -np.inf, bounds["lbx"]), 0.0),
@@ -88,16 +105,17 @@ class FeasibilityRestoration:
             lbg=np.concatenate(lbg),
             ubg=np.concatenate(ubg),
         )
-        w, stats = np.array(answer["x"]).ravel()[:-1], self._nlp.stats()
+        w, stats = np.array(solution["x"]).ravel()[:-1], self._nlp.stats()
         if not stats["success"] or not np.isfinite(w).all():
             return None
         cost, g = (np.array(value).ravel() for value in self._values(w, p))
-        nothing = np.zeros_like(g)
-        found = NlpResult(w, float(cost[0]), g, np.zeros_like(w), nothing, stats)
-        return found, *self.transcription.worst(w, g, bounds)
+        result = NlpResult(w, float(cost[0]), g, np.zeros_like(w), np.zeros_like(g), stats)
+        violation, row = self.transcription.worst(w, g, bounds)
+        return LeastViolation(result, violation, row)
 
     @cached_property
     def _values(self) -> ca.Function:
+        """Cost and constraints of the problem itself."""
         program = self.transcription.program
         inputs, outputs = (program["x"], program["p"]), (program["f"], program["g"])
         return ca.Function("values", inputs, outputs)

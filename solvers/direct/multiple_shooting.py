@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 
 from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver
 from ocp.internal import RunData, Transcription, check_instance, check_positive, check_whole
-from solvers.direct.nlp_backends import NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
 class MultipleShooting(Solver):
-    """The direct baseline: everything that a problem can say.
+    """The direct baseline, for every kind of problem that can be described.
 
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
 
@@ -30,18 +30,18 @@ class MultipleShooting(Solver):
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
-            interval is halved; an answer beyond it is ``INACCURATE``.
+            interval is halved; a solution beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
         time_limit: for each run of the backend, of which a solve may take three [s]; inf:
             unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT returns its iterate,
-            ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; where
-            there is a limit it runs in a process of its own, and once ended it has nothing to
-            show: ``FAILED``.
-        feasibility_restoration: where the search fails, look for the least violating
-            trajectory: it tells an infeasible problem from a lost search and is a better start for
-            a second one. It may cost 300 iterations; a controller that has to answer in time
-            does without.
+            ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; with a
+            limit it runs in a process of its own, and a process that is ended returns no iterate:
+            ``FAILED``.
+        feasibility_restoration: after a failure, find the trajectory that violates the
+            constraints least: it tells whether the problem is infeasible, and is a better first
+            iterate if it is not. It may cost 300 iterations; turn it off in a controller with a
+            deadline.
     """
 
     intervals: int = 75
@@ -60,10 +60,10 @@ class MultipleShooting(Solver):
         check_whole(self.intervals, "multiple shooting: intervals")
         check_instance(self.integrator, Integrator, "multiple shooting: integrator")
         check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)
-        self.options  # noqa: B018 - checks its own
+        self.nlp_backend.check()
 
     @property
-    def options(self) -> NlpBackend:
+    def nlp_backend(self) -> NlpBackend:
         """The backend with its options."""
         return NlpBackend(
             name=self.backend,
@@ -76,10 +76,9 @@ class MultipleShooting(Solver):
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
-        intervals = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
-        program = MultipleShootingProgram(self, transcription, intervals)
-        program.search.nlp  # noqa: B018 - all symbolic work is done here
-        return program
+        grid = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
+        nlp = self.nlp_backend.build(transcription)
+        return MultipleShootingProgram(self, transcription, grid, nlp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +88,14 @@ class MultipleShootingProgram(Program):
     Attributes:
         solver: the options.
         transcription: the problem on its grid.
-        intervals: for first guesses, and to check the integrator.
+        grid: for first iterates, and to check the integrator.
+        nlp: the backend, set up.
     """
 
     solver: MultipleShooting
     transcription: Transcription
-    intervals: ShootingGrid
+    grid: ShootingGrid
+    nlp: Nlp
 
     def run(
         self,
@@ -104,24 +105,23 @@ class MultipleShootingProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Solve for these data; where that fails, look for a trajectory that is feasible."""
+        """Solve for these data, in the phases of ``NlpRun``."""
         started = perf_counter()
         ocp = self.transcription.ocp
         data = RunData.of(ocp, x0, t0, parameters)
         z, u = self.first_iterate(data, ocp.first_guess(guess))
-        found = self.search.solve(self.transcription.join(z, u), data)
-        return self._solution(data, found, perf_counter() - started)
+        outcome = self._nlp_run.solve(self.transcription.join(z, u), data)
+        return self._solution(data, outcome, perf_counter() - started)
 
     @cached_property
-    def search(self) -> NlpRun:
-        """The backend, and what is done around it."""
-        solver = self.solver
+    def _nlp_run(self) -> NlpRun:
+        """Kept, since it keeps the elastic problem of the feasibility restoration."""
         return NlpRun(
             transcription=self.transcription,
-            options=solver.options,
-            accuracy=solver.accuracy,
-            error=self._integration_error,
-            feasibility_restoration=solver.feasibility_restoration,
+            nlp=self.nlp,
+            accuracy=self.solver.accuracy,
+            state_error=self._integration_error,
+            feasibility_restoration=self.solver.feasibility_restoration,
         )
 
     # -- the first iterate -------------------------------------------------------------------
@@ -132,38 +132,38 @@ class MultipleShootingProgram(Program):
         """Return states and controls of the guess, a free final time with the states."""
         tr, ocp = self.transcription, self.transcription.ocp
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
-        x, u = self.intervals.first_iterate(data, guess, duration)
+        x, u = self.grid.first_iterate(data, guess, duration)
         z = np.hstack([x, np.full((tr.n + 1, 1), duration)]) if ocp.has_free_time else x
         return z, u
 
-    # -- the answer ---------------------------------------------------------------------------
+    # -- the result ---------------------------------------------------------------------------
 
-    def _integration_error(self, answer: NlpResult, data: RunData) -> tuple[float, int]:
+    def _integration_error(self, result: NlpResult, data: RunData) -> tuple[float, int]:
         """By how much half the step moves the end of an interval, relative to 1 + abs(x)."""
         tr = self.transcription
-        z, u = tr.split(answer.w)
-        schedule = self.intervals.schedule(data, tr.duration(answer.w))
-        return self.intervals.error(z[:, : tr.ocp.model.nx], u, schedule)
+        z, u = tr.split(result.w)
+        schedule = self.grid.schedule(data, tr.duration(result.w))
+        return self.grid.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
-        """The last answer, with the work of all."""
-        tr, answer = self.transcription, found.last
-        z, u = tr.split(answer.w)
+    def _solution(self, data: RunData, outcome: NlpOutcome, seconds: float) -> Solution:
+        """The last result, with the work of all runs."""
+        tr, result = self.transcription, outcome.last
+        z, u = tr.split(result.w)
         return Solution(
             problem=tr.ocp,
             solver=repr(self.solver),
-            status=found.status,
-            message=found.message,
-            t=self.search.times(answer, data),
+            status=outcome.status,
+            message=outcome.message,
+            t=self._nlp_run.times(result, data),
             x=z[:, : tr.ocp.model.nx],
             x0=data.x0,
-            costate=tr.costates(answer.w, answer.lam_x, answer.lam_g, data),
+            costate=tr.costates(result.w, result.lam_x, result.lam_g, data),
             u=u,
-            cost=answer.cost,
-            residual=found.residual,
-            iterations=found.iterations,
-            work=found.work,
-            history=found.history(),
+            cost=result.cost,
+            residual=outcome.residual,
+            iterations=outcome.iterations,
+            work=outcome.work,
+            history=outcome.history(),
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )

@@ -1,4 +1,8 @@
-"""The nonlinear programming backends: their options, and answers that are always finite."""
+"""The nonlinear programming backends IPOPT and fatrop: options, set-up and results.
+
+``NlpBackend``: the options; ``Nlp``: a backend set up for one problem; ``NlpResult``: what one
+run of it returns, with finite numbers only but for the cost.
+"""
 
 import warnings
 from contextlib import nullcontext, redirect_stderr
@@ -21,17 +25,17 @@ from solvers.direct.transcribed_problem import TranscribedProblem
 
 @dataclass(frozen=True)
 class NlpBackend:
-    """A backend with what a user may set.
+    """A backend with its options, to be checked by ``check``.
 
     Args:
         name: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
         tolerance: of the optimality conditions.
         max_iterations: limit.
         verbose: let it print.
-        time_limit: for one run [s]. IPOPT looks at the clock in each iteration and returns its
-            iterate. fatrop knows no clock, and for ever tries to solve a linear system that has
-            no solution, whatever the limit of iterations: where it is limited it runs in a
-            process of its own, see ``SubprocessFunction``, and once ended it has nothing to show.
+        time_limit: for one run [s]. IPOPT reads the clock in each iteration and returns its
+            iterate. fatrop has no time limit, and may try for ever to solve a singular linear
+            system inside one iteration. With a limit it runs in a process of its own, see
+            ``SubprocessFunction``; a process that is ended returns no iterate.
     """
 
     name: Literal["ipopt", "fatrop"] = "ipopt"
@@ -40,8 +44,12 @@ class NlpBackend:
     verbose: bool = False
     time_limit: float = np.inf
 
-    def __post_init__(self) -> None:
-        """Check the options."""
+    def check(self) -> None:
+        """Check the options.
+
+        Raises:
+            ProblemError: for an unknown backend or a number that is not positive.
+        """
         if self.name not in ("ipopt", "fatrop"):
             raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
         check_whole(self.max_iterations, "a backend's max_iterations")
@@ -63,10 +71,10 @@ class NlpBackend:
             f"{self.name}.max_iter": self.max_iterations,
         }
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
-        return Nlp(function, self.verbose, self._subprocess(function))
+        return Nlp(self, function, self._subprocess(function))
 
     def _subprocess(self, function: ca.Function) -> SubprocessFunction | None:
-        """Return the process for a backend that may not return, where one is wanted."""
+        """Return the process for fatrop with a time limit; None: run in this process."""
         if self.name != "fatrop" or self.time_limit == np.inf:
             return None
         if not SUBPROCESS_SUPPORTED:
@@ -97,20 +105,20 @@ class NlpBackend:
 
 @dataclass(frozen=True, eq=False)
 class Nlp:
-    """A backend that is set up.
+    """A backend set up for one problem.
 
     Attributes:
+        backend: the options.
         function: the ``casadi.nlpsol``.
-        verbose: whether it may print.
         subprocess: the process that it runs in; None: this one.
     """
 
+    backend: NlpBackend
     function: ca.Function
-    verbose: bool
     subprocess: SubprocessFunction | None = None
 
     def solve(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> "NlpResult":
-        """Run it; where a number comes back that is not finite, return the first iterate.
+        """Run the backend; return the first iterate where its result is not finite.
 
         Args:
             w0: first iterate.
@@ -119,29 +127,32 @@ class Nlp:
         """
         inputs = {"x0": w0, "p": p, **bounds}
         try:
-            raw, stats = self.subprocess(inputs) if self.subprocess else self._here(inputs)
+            raw, stats = self.subprocess(inputs) if self.subprocess else self._evaluate(inputs)
         except RuntimeError:  # fatrop throws where functions are not finite
             stats = {"return_status": "it threw an exception", "success": False}
-            return NlpResult.nothing(w0, len(bounds["lbg"]), stats)
+            return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         except SubprocessLost as loss:
             stats = {"return_status": str(loss), "success": False}
-            return NlpResult.nothing(w0, len(bounds["lbg"]), stats, is_lost=True)
+            return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats, is_lost=True)
         if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
-            return NlpResult.nothing(w0, len(bounds["lbg"]), stats)
-        # The interior point may sit outside a bound by rounding; what is returned does not.
+            return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
+        # An interior point may violate a bound by rounding; the result does not.
         w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
         return NlpResult(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
 
-    def _here(self, inputs: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        # CasADi warns of multipliers that are not finite, whatever its options say.
-        with nullcontext() if self.verbose else redirect_stderr(StringIO()):
+    def _evaluate(
+        self, inputs: dict[str, np.ndarray]
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Run it in this process."""
+        # CasADi warns of multipliers that are not finite; no option turns that off.
+        with nullcontext() if self.backend.verbose else redirect_stderr(StringIO()):
             raw = {name: np.array(value).ravel() for name, value in self.function(**inputs).items()}
         return raw, self.function.stats()
 
 
 @dataclass(frozen=True, eq=False)
 class NlpResult:
-    """What a backend returned, with every number finite but the cost.
+    """What one run of a backend returned; every number is finite but the cost.
 
     Attributes:
         w: unknowns, within their bounds.
@@ -149,8 +160,8 @@ class NlpResult:
         g: constraints.
         lam_x: multipliers of the bounds.
         lam_g: multipliers of the constraints.
-        stats: the backend's own words.
-        is_lost: whether there is no answer, since its process was ended.
+        stats: the backend's statistics.
+        is_lost: whether its process ended before it returned.
     """
 
     w: np.ndarray
@@ -162,41 +173,41 @@ class NlpResult:
     is_lost: bool = False
 
     @classmethod
-    def nothing(
+    def without_iterate(
         cls, w0: np.ndarray, rows: int, stats: dict[str, Any], *, is_lost: bool = False
     ) -> "NlpResult":
-        """Return the first iterate, where the backend has nothing to show."""
+        """Return the first iterate, for a run that has returned none."""
         zeros = np.zeros(rows)
         return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats, is_lost)
 
     @property
     def success(self) -> bool:
-        """Whether the backend says so."""
+        """Whether the backend reports success."""
         return bool(self.stats.get("success"))
 
     @property
-    def word(self) -> str:
-        """How the backend names the end."""
+    def return_status(self) -> str:
+        """The backend's own name of how it ended."""
         return str(self.stats.get("return_status", ""))
 
     @property
-    def count(self) -> int:
-        """Iterations."""
+    def iterations(self) -> int:
+        """Number of iterations."""
         return int(self.stats.get("iter_count", 0))
 
     @property
     def work(self) -> Work:
         """Evaluations and factorisations."""
         calls = [int(self.stats.get(f"n_call_nlp_{name}", 0)) for name in ("g", "jac_g")]
-        return Work(*calls, factorisations=self.count)
+        return Work(*calls, factorisations=self.iterations)
 
     def history(self, name: str) -> np.ndarray:
-        """Return a quantity per iteration; empty where the backend keeps none."""
+        """Return a quantity per iteration; empty where the backend records none."""
         return np.array((self.stats.get("iterations") or {}).get(name, []))
 
 
 def _refuse_for_fatrop(transcription: Transcription) -> None:
-    """Refuse what fatrop would meet with an assertion of its own, printed by itself."""
+    """Refuse problems that fatrop would end with a printed assertion of its own."""
     ocp, n = transcription.ocp, transcription.n
     if any(not c.is_equation for c in ocp.at("initial")):
         raise UnsupportedProblem(f"{ocp.name}: fatrop takes no inequality at the start; use ipopt")

@@ -1,4 +1,4 @@
-"""The intervals of a direct method: their data, where to start, and how accurate they are."""
+"""The grid of a shooting method: data of its intervals, first iterates, integration error."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,21 +17,21 @@ class ShootingGrid:
         ocp: the problem.
         n: number of intervals N.
         rollout: all intervals in a row.
-        halved: every interval on its own, with half the step.
+        half_step: every interval on its own, with half the integration step.
     """
 
     ocp: OCP
     n: int
     rollout: BufferedFunction
-    halved: BufferedFunction
+    half_step: BufferedFunction
 
     @classmethod
     def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "ShootingGrid":
         """Build them; ``fast``: as machine code."""
         finer = replace(integrator, steps=2 * integrator.steps)
         steps = [Stage.of(ocp, each, held=True).step for each in (integrator, finer)]
-        step, halved = map(compiled, steps) if fast else steps
-        return cls(ocp, n, BufferedFunction(step.mapaccum(n)), BufferedFunction(halved.map(n)))
+        step, half_step = map(compiled, steps) if fast else steps
+        return cls(ocp, n, BufferedFunction(step.mapaccum(n)), BufferedFunction(half_step.map(n)))
 
     @cached_property
     def fractions(self) -> np.ndarray:
@@ -39,7 +39,7 @@ class ShootingGrid:
         return np.linspace(0.0, 1.0, self.n + 1)
 
     def schedule(self, data: RunData, duration: float) -> list[np.ndarray]:
-        """Return times, steps and parameters at both ends of every interval, as columns."""
+        """Return t, h and the parameters at both ends of every interval, one column each."""
         nodes = self.fractions
         left, right = data.values.on(nodes)
         t = data.t0 + nodes[None, :-1] * duration
@@ -50,7 +50,8 @@ class ShootingGrid:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states (N + 1, nx) and controls (N, nu) of a guess.
 
-        Without states they are the controls' own roll-out; where that is not finite, the start.
+        A guess without states: the roll-out of its controls, or x0 at all nodes if the states
+        are not finite.
         """
         ocp, m, nodes = self.ocp, self.ocp.model, self.fractions
         x = guess.sample("x", nodes, m.nx) if guess else None
@@ -64,13 +65,14 @@ class ShootingGrid:
         return x, u
 
     def error(self, x: np.ndarray, u: np.ndarray, schedule: list[np.ndarray]) -> tuple[float, int]:
-        """Return by how much half the step moves the end of an interval, and of which.
+        """Return the integration error, relative to 1 + abs(x), and the node where it is largest.
 
-        Relative to 1 + abs(x); a discrete-time problem has no error.
+        By how much half the integration step changes the state at the end of an interval; 0 for
+        a discrete-time problem.
         """
         if self.ocp.model.is_discrete:
             return 0.0, 0
-        after, _ = self.halved(x[:-1].T, u.T, *schedule)
+        after, _ = self.half_step(x[:-1].T, u.T, *schedule)
         moved = np.abs(after.T - x[1:]) / (1.0 + np.abs(x[1:]))
         worst = int(moved.max(axis=1).argmax())
         return float(moved[worst].max()), worst + 1

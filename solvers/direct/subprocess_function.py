@@ -1,4 +1,4 @@
-"""Calls a CasADi Function in a process of its own, which is ended when it does not return."""
+"""``SubprocessFunction``: a CasADi Function in a process of its own, with a time limit per call."""
 
 import os
 import signal
@@ -17,13 +17,13 @@ import casadi as ca
 import numpy as np
 
 _SERVER = Path(__file__).with_name("subprocess_server.py")
-# One thread: the server forks, and none of its work is shared among several.
+# One thread: the server forks, and its work is not parallel.
 _SINGLE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-# A server that takes longer to start is none [s].
+# Start-up timeout of the server [s].
 _START = 60.0
-# No alarm can be set for much later [s].
+# Longest time limit that an alarm of the kernel accepts, with a margin [s].
 _LONGEST = 1e6
-#: Whether this system has what it takes: fork, and alarms of the kernel.
+#: Whether this system has fork and alarms of the kernel.
 SUBPROCESS_SUPPORTED = hasattr(os, "fork") and hasattr(signal, "setitimer")
 
 Inputs = dict[str, np.ndarray]
@@ -31,24 +31,24 @@ Outputs = dict[str, np.ndarray]
 
 
 class SubprocessLost(Exception):
-    """A call ended without an answer; the message says how."""
+    """A call returned nothing; the message says why."""
 
 
 class SubprocessFunction:
     """A CasADi Function that cannot hang or crash the process that calls it.
 
-    A limit of iterations, or a clock in this process, is no use where compiled code of somebody
-    else loops inside one iteration. A call takes longer than in this process, by what
-    ``python -m benchmarks arm-speed --only-driver`` shows, the first one by some tenths of a
-    second; after a loss the next is as quick as ever.
+    An iteration limit, or a clock in this process, cannot end compiled third-party code that
+    loops inside one iteration. ``python -m benchmarks arm-speed --only-driver`` shows how much
+    longer a call takes than in this process; the first one takes some tenths of a second more.
+    A call after a lost one is not slower.
 
     Args:
-        function: must be one that can be pickled.
-        seconds: what a call may take.
-        verbose: whether what it prints is shown.
+        function: a Function that can be pickled.
+        seconds: time limit of a call.
+        verbose: whether its output is shown.
 
     Attributes:
-        process: the number of the process, and of the group of those that it starts.
+        process: id of the process, and of its process group.
     """
 
     def __init__(self, function: ca.Function, seconds: float, *, verbose: bool = False) -> None:
@@ -59,7 +59,7 @@ class SubprocessFunction:
         self._start()
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[ca.Function, float]]:
-        """Pickle and copy what is called, not who answers."""
+        """Pickle and copy the Function and its limit; the copy starts a process of its own."""
         return partial(type(self), verbose=self.verbose), (self.function, self.seconds)
 
     def __call__(self, inputs: Inputs) -> tuple[Outputs, dict[str, Any]]:
@@ -67,43 +67,44 @@ class SubprocessFunction:
 
         Raises:
             RuntimeError: where the Function does.
-            Lost: if the call took too long, or its process ended by itself.
+            SubprocessLost: if the call took too long, or its process ended by itself.
         """
-        if self._owner != os.getpid():  # a fork: process, and who waits for it, are the other one's
+        if self._owner != os.getpid():  # after a fork: process and lock are the parent's
             self._lock = Lock()
             self._start()
         with self._lock:
-            answer = self._asked_for(inputs)
-        if isinstance(answer, RuntimeError):
-            raise answer
-        if answer == signal.SIGALRM.name:
+            reply = self._request(inputs)
+        if isinstance(reply, RuntimeError):
+            raise reply
+        if reply == signal.SIGALRM.name:
             raise SubprocessLost(f"did not return within {self.seconds:g} s")
-        if isinstance(answer, str):
-            raise SubprocessLost(f"was ended by {answer}")
-        return answer
+        if isinstance(reply, str):
+            raise SubprocessLost(f"was ended by {reply}")
+        return reply
 
-    def _asked_for(self, inputs: Inputs) -> Any:
-        if self._answered < self._asked:  # interrupted, or nobody is there
+    def _request(self, inputs: Inputs) -> Any:
+        """Return the outputs and statistics, an exception, or the signal that ended the process."""
+        if self._replies < self._requests:  # the last call was interrupted or lost
             self._start()
-        self._asked += 1
-        number, answer = 0, None
+        self._requests += 1
+        number, reply = 0, None
         try:
-            self._pipe.send((self._asked, inputs))
-            # A process that died between two calls leaves a word that this call takes for its
-            # own loss, and the answer to this one to the next call, which must not take it.
-            while number not in (self._asked, None):
+            self._pipe.send((self._requests, inputs))
+            # Replies are numbered: if the process died between two calls, this call takes the
+            # notice of that for its own loss, and its reply must not be taken by the next one.
+            while number not in (self._requests, None):
                 if not self._pipe.poll(self.seconds + _START):
                     raise SubprocessLost(
                         f"did not return within {self.seconds:g} s, nor did its process"
                     )
-                number, answer = self._pipe.recv()
+                number, reply = self._pipe.recv()
         except (EOFError, ConnectionError):
             raise SubprocessLost("ended with its process") from None
-        self._answered = self._asked
-        return answer
+        self._replies = self._requests
+        return reply
 
     def _start(self) -> None:
-        """Start a process, in place of the last one if there is one."""
+        """Start a process, and end the previous one if there is one."""
         if self._finish:
             self._finish()
         path = os.pathsep.join(entry for entry in sys.path if entry)
@@ -117,18 +118,18 @@ class SubprocessFunction:
                 stdout=printed,
                 stderr=printed,
                 env={**os.environ, **_SINGLE, "PYTHONPATH": path},
-                # Ctrl-C is for this process; and all of that session can be ended at once.
+                # Ctrl-C does not reach it, and all its processes can be ended at once.
                 start_new_session=True,
             )
         self.process, self._owner = process.pid, os.getpid()
-        self._asked = self._answered = 0
+        self._requests = self._replies = 0
         self._finish = finalize(self, _end, process, self._pipe, self._owner)
-        with suppress(ConnectionError):  # it died at once: the first call will find out
+        with suppress(ConnectionError):  # it died at once: the first call reports that
             self._pipe.send((self.function, self.seconds))
 
 
 def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:
-    """End a process and what it started, if it is ours."""
+    """End a process and all it has started, if this process started it."""
     pipe.close()
     if owner == os.getpid() and process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)

@@ -1,9 +1,9 @@
-"""The process of ``SubprocessFunction``: serves one CasADi Function, and may be ended inside it.
+"""The process of ``SubprocessFunction``: evaluates one CasADi Function, and may be ended in it.
 
-Run as a file, so that it imports CasADi and nothing of this package; its argument is the number
-of an open socket. In: the pair of Function and seconds, then for each call its number and a
-dictionary of inputs. Out: that number, and ``(outputs, stats)`` or the exception; or None, and the
-name of the signal that ended whoever was to answer.
+Run as a file, so that it imports CasADi and nothing of this package; its argument is the file
+descriptor of an open socket. In: the pair of Function and seconds, then for each call its number
+and a dictionary of inputs. Out: that number, and ``(outputs, stats)`` or the exception; or None,
+and the name of the signal that ended the child that evaluates.
 """
 
 import os
@@ -16,11 +16,11 @@ import numpy as np
 
 
 def main() -> None:
-    """Let a child answer; where it does not survive, say so and put another in its place.
+    """Let a child evaluate; if a signal ends it, report that and start another one.
 
-    A fork is ready at once, while a new process would import CasADi and read the Function again.
+    A fork is ready at once; a new process would import CasADi and read the Function again.
     """
-    # What the process that started this one ignores or blocks is inherited.
+    # Ignored and blocked signals are inherited from the parent process.
     for number in (signal.SIGALRM, signal.SIGCHLD):
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
@@ -38,9 +38,9 @@ def main() -> None:
 
 
 def _serve(function: ca.Function, seconds: float, pipe: Connection) -> None:
-    """Answer until nobody asks any more.
+    """Reply to calls until the pipe is closed.
 
-    The kernel keeps the time: the alarm ends the process wherever it is, in C++ too.
+    The alarm of the kernel ends the process wherever it is, in compiled code too.
     """
     while True:
         try:
@@ -50,11 +50,11 @@ def _serve(function: ca.Function, seconds: float, pipe: Connection) -> None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
             outputs = {name: np.array(value).ravel() for name, value in function(**inputs).items()}
-            answer = outputs, function.stats()
+            reply = outputs, function.stats()
         except RuntimeError as error:
-            answer = RuntimeError(str(error))
+            reply = RuntimeError(str(error))
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        pipe.send((number, answer))
+        pipe.send((number, reply))
 
 
 if __name__ == "__main__":

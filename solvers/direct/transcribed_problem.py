@@ -1,4 +1,4 @@
-"""What backends and the search for a solution need to know of a problem on a grid."""
+"""The interface of a problem on a grid: what backends and ``NlpRun`` use of it."""
 
 from functools import cached_property
 from typing import Protocol
@@ -11,7 +11,7 @@ from ocp.internal import ConstraintRow, RunData
 
 
 class TranscribedProblem(Protocol):
-    """A problem on a grid, by whichever method: ``ocp.Transcription`` is one."""
+    """A problem on a grid: ``Transcription`` by shooting, ``CollocatedProblem`` by collocation."""
 
     @property
     def ocp(self) -> OCP:
@@ -20,7 +20,7 @@ class TranscribedProblem(Protocol):
 
     @property
     def fractions(self) -> np.ndarray:
-        """Instants that the rows name by their number, as fractions of the horizon."""
+        """The nodes, as fractions of the horizon; ``ConstraintRow.node`` counts them."""
         ...
 
     @cached_property
@@ -30,7 +30,7 @@ class TranscribedProblem(Protocol):
 
     @cached_property
     def rows(self) -> tuple[ConstraintRow, ...]:
-        """What each row of g says."""
+        """The meaning of each row of g."""
         ...
 
     @property
@@ -48,7 +48,7 @@ class TranscribedProblem(Protocol):
         ...
 
     def data_vector(self, data: RunData) -> np.ndarray:
-        """Return the numbers of p."""
+        """Return the value of p."""
         ...
 
     def duration(self, w: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from ocp import OCP, RK4, Box, Compiler, Guess, Model, Solution, Status, evaluat
 from ocp.internal import RunData, Transcription
 from solvers import LinearMPC, MultipleShooting, StagewiseNewton
 from solvers.direct.newton.active_bounds import ActiveBounds
-from solvers.direct.newton.newton_step import Iterate, NewtonStep
+from solvers.direct.newton.newton_step import Iterate, Linearisation, NewtonDirection, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import changed, moving, point, quartic, tracker
@@ -188,11 +188,11 @@ def test_the_step_is_the_minimum_of_the_quadratic_model(limit: float) -> None:
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
     schedule = ShootingGrid.of(ocp, n, RK4(), fast=False).schedule(data, ocp.duration)
-    view = newton.view(at, [*schedule, data.values.at(1.0)[0]])
-    step = newton.step(view)
+    here = newton.linearise(at, [*schedule, data.values.at(1.0)[0]])
+    step = newton.direction(here)
     assert step.is_settled
     assert step.is_convex
-    dx, du, dp = linear_model(newton, view, step)
+    dx, du, dp = linear_model(here, step)
     dw = transcription.join(dx.T, du.T)
     np.testing.assert_allclose(A @ dw, -gap[:, 0], atol=1e-10)
     left = H @ dw + q[:, 0] - A.T @ dp.T[1:].ravel()
@@ -200,14 +200,14 @@ def test_the_step_is_the_minimum_of_the_quadratic_model(limit: float) -> None:
     np.testing.assert_allclose(left[nx:][~control[nx:]], 0.0, atol=1e-9)
     u, g = (at.u + du).ravel(), left[control]
     np.testing.assert_allclose(u, np.clip(u - g, -limit, limit), atol=1e-9)
-    assert step.bend == pytest.approx(float(dw @ H @ dw))
+    assert step.slopes.directional_curvature == pytest.approx(float(dw @ H @ dw))
 
 
-def linear_model(newton: NewtonStep, view, step) -> tuple[np.ndarray, ...]:
+def linear_model(here: Linearisation, step: NewtonDirection) -> tuple[np.ndarray, ...]:
     """dx, du and dp that the law leads to."""
-    jacobian, _, _, end_slope, end_hessian = view.derivatives[:5]
-    nx, n = view.gap_by_stage.shape
-    nu = len(view.pull)
+    stages = here.stages
+    nx, n = stages.defects.shape
+    nu = len(stages.control_gradient)
     dx, du, dp = np.zeros((nx, n + 1)), np.zeros((nu, n)), np.zeros((nx, n + 1))
     for k in range(n):
         law = step.law[:, (nx + 1) * k : (nx + 1) * (k + 1)] @ np.append(dx[:, k], 1.0)
@@ -215,9 +215,9 @@ def linear_model(newton: NewtonStep, view, step) -> tuple[np.ndarray, ...]:
         last_first = (nx + nu) * (n - 1 - k)
         moved = np.append(dx[:, k], du[:, k])
         dx[:, k + 1] = (
-            jacobian[:, last_first : last_first + nx + nu] @ moved + view.gap_by_stage[:, k]
+            stages.jacobian[:, last_first : last_first + nx + nu] @ moved + stages.defects[:, k]
         )
-    dp[:, n] = end_hessian @ dx[:, n] + end_slope[:, 0]
+    dp[:, n] = stages.end_hessian @ dx[:, n] + stages.end_gradient[:, 0]
     return dx, du, dp
 
 
@@ -230,17 +230,19 @@ def test_exchanges_end_at_the_minimum(seed: int, size: int) -> None:
     matrix, linear = root @ root.T + 0.01 * np.eye(size), rng.normal(size=size)
     bounds = Box(-rng.uniform(0.0, 1.0, size), rng.uniform(0.0, 1.0, size))
     u = bounds.clip(rng.normal(size=size))
-    clamped = ActiveBounds.at(u[:, None], (matrix @ u + linear)[:, None], bounds)
-    clamped._left = 3**size
+    active = ActiveBounds.at(u[:, None], (matrix @ u + linear)[:, None], bounds)
+    exchanges = 0
     while True:
-        du = clamped.moves[:, 0]
-        held, free = clamped.chosen[:, 0] == 1, clamped.chosen[:, 0] == 0
+        du = active.clamped_step[:, 0]
+        held, free = active.clamped[:, 0] == 1, active.clamped[:, 0] == 0
         slope = matrix @ (u + du * held) + linear
         du[free] = -np.linalg.solve(matrix[free][:, free], slope[free])
         slope = matrix @ (u + du) + linear
-        if clamped.suits(du[:, None], (slope * held)[:, None], 1.0):
+        check = active.check(du[:, None], (slope * held)[:, None], 1.0)
+        if not check.wrong.any():
             break
-        assert clamped.exchange()
+        assert exchanges < 3**size
+        active, exchanges = active.exchanged(check), exchanges + 1
     np.testing.assert_allclose(u + du, bounds.clip(u + du - slope), atol=1e-8)
 
 

@@ -140,18 +140,20 @@ def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
     start = slope[:nx, 0] + (hessian @ dw)[:nx] - jacobian[:, :nx].T @ dense[moves.sum() :]
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
-    intervals = ShootingGrid.of(ocp, n, RK4(), fast=False)
-    schedule = [*intervals.schedule(data, ocp.duration), data.values.at(1.0)[0]]
-    view = newton.view(at, schedule)
-    step = newton.step(view, sigma)
-    there = newton.moved(step, view, 1.0, schedule)
+    grid = ShootingGrid.of(ocp, n, RK4(), fast=False)
+    schedule = [*grid.schedule(data, ocp.duration), data.values.at(1.0)[0]]
+    here = newton.linearise(at, schedule)
+    step = newton.direction(here, sigma)
+    there = newton.trial_iterate(step, here, 1.0, schedule)
     np.testing.assert_allclose(there.u[:, 0] - at.u[:, 0], dw[nx : nx + nu], rtol=1e-9)
     np.testing.assert_allclose(there.costate[:, 0], start, rtol=1e-9)
-    assert step.cost_slope == pytest.approx(float(derivative(program, w, data, transcription) @ dw))
-    assert step.bend == pytest.approx(float(dw @ hessian @ dw))
-    half = newton.moved(step, view, 0.5, schedule)
-    gaps = (newton.view(part, schedule).gap for part in (at, half, there))
-    before, middle, after = gaps
+    cost_slope = float(derivative(program, w, data, transcription) @ dw)
+    assert step.slopes.cost_slope == pytest.approx(cost_slope)
+    assert step.slopes.directional_curvature == pytest.approx(float(dw @ hessian @ dw))
+    half = newton.trial_iterate(step, here, 0.5, schedule)
+    before, middle, after = (
+        newton.linearise(part, schedule).measures.defect_norm2 for part in (at, half, there)
+    )
     assert middle == pytest.approx(0.5 * before)
     assert after == pytest.approx(0.0, abs=1e-12)
 

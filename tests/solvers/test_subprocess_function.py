@@ -232,12 +232,12 @@ def test_fatrop_is_ended_where_it_never_returns() -> None:
     solver = MultipleShooting(
         8, backend="fatrop", max_iterations=40, time_limit=0.5, feasibility_restoration=False
     )
-    nlp = solver.build(arm(()).mpc.ocp).search.nlp
+    nlp = solver.build(arm(()).mpc.ocp).nlp
     data = dict(np.load(DATA))
     w0, p = data.pop("w0"), data.pop("p")
     answer = nlp.solve(w0, p, data)
     assert answer.is_lost
-    assert answer.word == "did not return within 0.5 s"
+    assert answer.return_status == "did not return within 0.5 s"
     np.testing.assert_array_equal(answer.w, w0)
     assert nlp.solve(0.0 * w0, p, data).w.shape == w0.shape, "and it goes on"
 
@@ -259,9 +259,8 @@ class Stuck(SubprocessFunction):
 def stuck(answers: int = 0, *, feasibility_restoration: bool = False) -> MultipleShootingProgram:
     solver = MultipleShooting(10, backend="fatrop", feasibility_restoration=feasibility_restoration)
     program = solver.build(cart())
-    own = program.search.nlp
-    program.search.__dict__["nlp"] = replace(own, subprocess=Stuck(own.function, answers))
-    return program
+    own = program.nlp
+    return replace(program, nlp=replace(own, subprocess=Stuck(own.function, answers)))
 
 
 def test_a_lost_answer_is_a_failure_with_a_reason() -> None:
@@ -272,30 +271,30 @@ def test_a_lost_answer_is_a_failure_with_a_reason() -> None:
     assert np.isfinite(solution.x).all()
 
 
-def test_a_lost_answer_may_be_rescued_as_any_failure() -> None:
+def test_feasibility_is_restored_after_a_lost_answer_as_after_any_failure() -> None:
     solution = stuck(feasibility_restoration=True).run()
     assert solution.status is Status.FAILED, "the constraints can be met, and it is lost again"
     assert "did not return" in solution.message
 
 
 def test_an_answer_is_kept_where_only_its_test_is_lost() -> None:
-    """From its own solution a solver does not move, and looks beside it."""
+    """From its own solution a solver does not move, and is run again from perturbed controls."""
     good = MultipleShooting(10, backend="fatrop").build(cart()).run()
     solution = stuck(answers=1).run(guess=good)
     assert solution.status is Status.STATIONARY
-    assert "from beside it, fatrop did not return" in solution.message
+    assert "from perturbed controls, fatrop did not return" in solution.message
     assert solution.cost == pytest.approx(good.cost, rel=1e-9)
 
 
 @pytest.mark.parametrize("solver", [MultipleShooting(20), Collocation(10)], ids=["ms", "colloc"])
 def test_ipopt_returns_its_iterate_at_the_time_limit(solver: MultipleShooting) -> None:
-    solution = replace(solver, time_limit=1e-9, **_without_rescue(solver)).build(cart()).run()
+    solution = replace(solver, time_limit=1e-9, **_without_restoration(solver)).build(cart()).run()
     assert solution.status is Status.TIME_LIMIT
     assert np.isfinite(solution.cost)
     assert replace(solver, time_limit=60.0).build(cart()).run().status is Status.SOLVED
 
 
-def _without_rescue(solver: object) -> dict[str, bool]:
+def _without_restoration(solver: object) -> dict[str, bool]:
     return {"feasibility_restoration": False} if isinstance(solver, MultipleShooting) else {}
 
 
@@ -309,7 +308,7 @@ def test_a_time_limit_is_a_positive_number(solver: Callable[..., object], limit)
 def test_without_a_limit_fatrop_runs_here() -> None:
     for limit in (None, np.inf):
         solver = MultipleShooting(10, backend="fatrop", time_limit=limit)
-        assert solver.build(cart()).search.nlp.subprocess is None
+        assert solver.build(cart()).nlp.subprocess is None
 
 
 def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -317,5 +316,5 @@ def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.Monkey
     solver = MultipleShooting(10, backend="fatrop", time_limit=1.0)
     with pytest.warns(UserWarning, match="time limit of fatrop"):
         program = solver.build(cart())
-    assert program.search.nlp.subprocess is None
+    assert program.nlp.subprocess is None
     assert program.run().status is Status.SOLVED

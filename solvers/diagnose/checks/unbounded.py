@@ -63,7 +63,7 @@ def _ray(subject: DiagnosedProblem) -> float | None:
 
 
 def _cost(subject: DiagnosedProblem, i: int, size: float) -> float:
-    ocp, data, intervals = subject.ocp, subject.data, subject.program.intervals
+    ocp, data, intervals = subject.ocp, subject.data, subject.program.grid
     u = subject.along.u[:-1].copy()
     u[:, i] = size
     x, costs = intervals.rollout(data.x0, u.T, *intervals.schedule(data, ocp.duration))

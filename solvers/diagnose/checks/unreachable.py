@@ -63,7 +63,7 @@ def _rollout(
     u = _excited(subject, seed)
     # A free duration is doubled once, so that what only time moves is seen to move.
     duration = ocp.duration * (1.0 + seed * float(ocp.has_free_time))
-    intervals = subject.program.intervals
+    intervals = subject.program.grid
     inputs = intervals.schedule(subject.data, duration)
     after = np.array(intervals.rollout(subject.data.x0, u.T, *inputs)[0]).T
     states = np.vstack([subject.data.x0, after])

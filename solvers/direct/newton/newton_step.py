@@ -1,6 +1,7 @@
-"""What is known at an iterate, and the Newton step from there within the bounds of the controls."""
+"""An iterate, its linearisation, and the Newton step from it within the bounds of the controls."""
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import ClassVar
 
 import numpy as np
@@ -8,7 +9,18 @@ import numpy as np
 from ocp import OCP, Box, Integrator
 from ocp.internal import BufferedFunction
 from solvers.direct.newton.active_bounds import ActiveBounds
-from solvers.direct.newton.newton_functions import evaluate_stages, riccati_solve, trial_iterate
+from solvers.direct.newton.newton_functions import (
+    Measures,
+    RiccatiSolution,
+    StageEvaluation,
+    StepSlopes,
+    evaluate_stages,
+    riccati_solve,
+    trial_iterate,
+)
+
+# Most Riccati solves for one step: a good guess of the active bounds takes one to three.
+_MAX_SOLVES = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,52 +34,34 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    r"""What is known at an iterate: how good it is, and the derivatives a step takes.
-
-    With gaps c_k = F(x_k, u_k) - x_{k+1} and stage costs l the Lagrangian is
-
-    .. math:: \sum_k l(x_k, u_k) + p_{k+1}' c_k + \varphi(x_N) - p_0' x_0.
+    """An iterate with the derivatives of its stages.
 
     Attributes:
         at: the iterate.
-        derivatives: of the stages and of the end, as ``newton_functions.sweep`` takes them.
-        gap_by_stage: c (nx, N).
-        pull: slopes of the Lagrangian in the controls (nu, N).
-        cost: the sum of the stages' costs and the final one.
-        gaps: sum of abs(c).
-        gap: norm of c.
-        slope: norm of the Lagrangian's slopes in states and controls, these as far as the bounds
-            leave room: s (u - clip(u - slope / s)) with s = 1 + abs(p), where the bounds are
-            wider than one; else their width is the unit of u.
-        largest_costate: largest abs(p).
-        size: largest element of H_uu and H_ux, to measure a shift by.
+        stages: derivatives and defects.
+        measures: cost, and norms of defects and derivatives.
     """
 
     at: Iterate
-    derivatives: tuple[np.ndarray, ...]
-    gap_by_stage: np.ndarray
-    pull: np.ndarray
-    cost: float
-    gaps: float
-    gap: float
-    slope: float
-    largest_costate: float
-    size: float
+    stages: StageEvaluation
+    measures: Measures
 
     @property
     def residual(self) -> float:
-        """The gaps, or the slopes relative to 1 + abs(p), whichever is larger.
+        """Norm of the defects, or of the gradient relative to 1 + abs(p), whichever is larger.
 
-        A gap c changes the cost by p'c: where that, relative to 1 + abs(cost), is more than the
-        gap itself, it counts.
+        A defect c changes the cost by p'c; where this change, relative to 1 + abs(cost), is
+        larger than the defect itself, it is taken instead.
         """
-        worth = self.largest_costate / (1.0 + abs(self.cost))
-        return max(self.gap * max(1.0, worth), self.slope / (1.0 + self.largest_costate))
+        m = self.measures
+        worth = m.largest_costate / (1.0 + abs(m.cost))
+        return max(m.defect_norm2 * max(1.0, worth), m.gradient_norm / (1.0 + m.largest_costate))
 
     @property
     def is_finite(self) -> bool:
-        """Whether the iterate means anything."""
-        return bool(np.isfinite([self.cost, self.gaps, self.slope]).all())
+        """Whether cost, defects and gradient are finite."""
+        m = self.measures
+        return isfinite(m.cost) and isfinite(m.defect_norm1) and isfinite(m.gradient_norm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,29 +71,26 @@ class NewtonDirection:
     Attributes:
         law: for every stage (nu + nx, nx + 1), see ``backwards``, side by side.
         pivots: of every Q_uu among the free controls, relative to its diagonal, (nu, N).
-        is_settled: whether the clamped controls are the right ones: no free one leaves its
-            bounds, none is held at a bound that it would leave.
-        sweeps: how many recursions it took.
-        next_costate: largest abs(p) after the step.
-        cost_slope: slope of the cost along the step.
-        bend: second derivative of the (shifted) Lagrangian along the step.
+        slopes: directional derivatives along the step, and the costates after it.
+        is_settled: whether the active bounds are found: no free control leaves its bounds, none
+            is clamped at a bound that the cost draws it away from.
+        riccati_solves: how many it took.
     """
 
     law: np.ndarray
     pivots: np.ndarray
+    slopes: StepSlopes
     is_settled: bool
-    sweeps: int
-    next_costate: float
-    cost_slope: float
-    bend: float
+    riccati_solves: int
 
-    # A pivot below this share of its diagonal is zero but for rounding.
+    # A pivot below this share of its diagonal is zero up to rounding.
     definite: ClassVar[float] = 1e-10
 
     @property
     def is_convex(self) -> bool:
         """Whether the model has a minimum among the free controls, and the step leads there."""
-        return bool(self.pivots.min() > self.definite) and bool(np.isfinite(self.bend))
+        is_definite = bool(self.pivots.min() > self.definite)
+        return is_definite and isfinite(self.slopes.directional_curvature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,68 +98,78 @@ class NewtonStep:
     """The Newton step of a problem on N intervals.
 
     Attributes:
-        look: (x, u, costate, data) to what ``View`` consists of; the data are t, h, p0,
-            p1 of all stages, and the parameters at the end.
-        sweep: (derivatives, sigma, clamped, their moves) to what ``Step`` consists of.
-        go: (x, u, costate, share, law, gaps, data) to x, u, costate.
+        evaluate_stages: see ``newton_functions.evaluate_stages``.
+        riccati_solve: see ``newton_functions.riccati_solve``.
+        feedback_rollout: see ``newton_functions.trial_iterate``.
         bounds: of the controls.
     """
 
-    look: BufferedFunction
-    sweep: BufferedFunction
-    go: BufferedFunction
+    evaluate_stages: BufferedFunction
+    riccati_solve: BufferedFunction
+    feedback_rollout: BufferedFunction
     bounds: Box
 
     @classmethod
     def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "NewtonStep":
         """Build it; ``fast``: stage and recursion as machine code."""
-        looking, going = (
-            make(ocp, n, integrator, fast=fast) for make in (evaluate_stages, trial_iterate)
-        )
         return cls(
-            look=BufferedFunction(looking),
-            sweep=BufferedFunction(riccati_solve(ocp, n, fast=fast)),
-            go=BufferedFunction(going),
+            evaluate_stages=BufferedFunction(evaluate_stages(ocp, n, integrator, fast=fast)),
+            riccati_solve=BufferedFunction(riccati_solve(ocp, n, fast=fast)),
+            feedback_rollout=BufferedFunction(trial_iterate(ocp, n, integrator, fast=fast)),
             bounds=ocp.control_bounds,
         )
 
-    def view(self, at: Iterate, schedule: list[np.ndarray]) -> Linearisation:
+    def linearise(self, at: Iterate, schedule: list[np.ndarray]) -> Linearisation:
         """Evaluate all stages.
 
         Args:
             at: the iterate.
             schedule: t, h, p0, p1 of all stages, and the parameters at the end.
         """
-        *derivatives, gap, pull, numbers = self.look(at.x, at.u, at.costate, *schedule)
-        known = (*derivatives, gap, at.costate)
-        return Linearisation(at, known, gap, pull, *numbers.ravel().tolist())
+        stages = StageEvaluation(*self.evaluate_stages(at.x, at.u, at.costate, *schedule))
+        return Linearisation(at, stages, Measures(*stages.measures.ravel().tolist()))
 
-    def step(self, view: Linearisation, sigma: float = 0.0) -> NewtonDirection:
-        """Minimise the quadratic model at an iterate.
+    def direction(self, here: Linearisation, sigma: float = 0.0) -> NewtonDirection:
+        """Minimise the quadratic model at an iterate within the bounds of the controls.
 
         Args:
-            view: of the iterate.
-            sigma: shift of every H_uu (Levenberg), in the space of the controls: with the gaps
+            here: linearisation at the iterate.
+            sigma: shift of every H_uu (Levenberg), in the space of the controls: with the defects
                 closed it is added to the second derivative of the cost as a function of the
                 controls alone, which is positive definite if and only if every Q_uu is.
         """
         if not self.bounds.is_active:
-            none = np.zeros_like(view.at.u)
-            law, pivots, _, _, numbers = self.sweep(*view.derivatives, sigma, none, none)
-            return NewtonDirection(law, pivots, True, 1, *numbers.ravel().tolist())
-        clamped, sweeps = ActiveBounds.at(view.at.u, view.pull, self.bounds), 0
+            free = np.zeros_like(here.at.u)
+            return _direction(self._solve(here, sigma, free, free), 1, is_settled=True)
+        active = ActiveBounds.at(here.at.u, here.stages.control_gradient, self.bounds)
+        scale, solves = 1.0 + here.measures.largest_costate, 0
         while True:
-            chosen = clamped.chosen, clamped.moves
-            law, pivots, du, slope, numbers = self.sweep(*view.derivatives, sigma, *chosen)
-            sweeps += 1
-            fits = clamped.suits(du, slope, 1.0 + view.largest_costate)
-            step = NewtonDirection(law, pivots, fits, sweeps, *numbers.ravel().tolist())
-            if fits or not step.is_convex or not clamped.exchange():
+            solution = self._solve(here, sigma, active.clamped, active.clamped_step)
+            solves += 1
+            check = active.check(solution.du, solution.clamped_gradient, scale)
+            step = _direction(solution, solves, is_settled=not check.wrong.any())
+            if step.is_settled or not step.is_convex or solves == _MAX_SOLVES:
                 return step
+            active = active.exchanged(check)
 
-    def moved(
-        self, step: NewtonDirection, view: Linearisation, share: float, schedule: list[np.ndarray]
+    def trial_iterate(
+        self, step: NewtonDirection, here: Linearisation, length: float, schedule: list[np.ndarray]
     ) -> Iterate:
-        """Return where a share of the step from an iterate leads, by the model itself."""
-        at, laws = view.at, (step.law, view.gap_by_stage)
-        return Iterate(*self.go(at.x, at.u, at.costate, share, *laws, *schedule))
+        """Return the iterate after a step of a length in [0, 1], by the nonlinear model itself."""
+        at, defects = here.at, here.stages.defects
+        inputs = (at.x, at.u, at.costate, length, step.law, defects, *schedule)
+        return Iterate(*self.feedback_rollout(*inputs))
+
+    def _solve(
+        self, here: Linearisation, sigma: float, clamped: np.ndarray, clamped_step: np.ndarray
+    ) -> RiccatiSolution:
+        """Minimise the quadratic model with given clamped controls."""
+        s = here.stages
+        derivatives = (s.jacobian, s.gradient, s.hessian, s.end_gradient, s.end_hessian)
+        given = (s.defects, here.at.costate, sigma, clamped, clamped_step)
+        return RiccatiSolution(*self.riccati_solve(*derivatives, *given))
+
+
+def _direction(solution: RiccatiSolution, solves: int, *, is_settled: bool) -> NewtonDirection:
+    slopes = StepSlopes(*solution.slopes.ravel().tolist())
+    return NewtonDirection(solution.law, solution.pivots, slopes, is_settled, solves)

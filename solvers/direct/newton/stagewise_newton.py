@@ -1,4 +1,4 @@
-"""Newton's method stage by stage: the quickest way to a minimum within bounds of the controls."""
+"""``StagewiseNewton``: Newton's method by a Riccati recursion, within bounds of the controls."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ from ocp import (
     Work,
 )
 from ocp.internal import RunData, check_instance, check_positive, check_whole
-from solvers.direct.newton.globalised_newton import GlobalisedNewton
+from solvers.direct.newton.globalised_newton import GlobalisedNewton, NewtonOutcome
 from solvers.direct.newton.newton_step import Iterate, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid
 
@@ -30,17 +30,18 @@ class StagewiseNewton(Solver):
     r"""Newton's method on the program of ``MultipleShooting``, solved by a Riccati recursion.
 
     The same transcription, hence the same optimal value: controls held on N intervals, one
-    step of the integrator each, the gaps between them closed at the end. One Newton step with
-    the exact second derivative of the Lagrangian costs one evaluation of every stage and one
+    step of the integrator each, the defects between them closed at the end. One Newton step with
+    the exact second derivative of the Lagrangian takes one evaluation of every stage and one
     recursion: effort linear in N. Where that derivative is not convex on the controls it is
-    shifted (see ``NewtonStep.step``), and steps are shortened by a line search on an exact
+    shifted (see ``NewtonStep.direction``), and steps are shortened by a line search on an exact
     penalty function.
 
     Controls at a bound are clamped inside the recursion, which is repeated, without new
-    derivatives, until the right ones are (see ``ActiveBounds``): one to three times from a plan of
-    the step before, more from afar. No iterate is ever out of bounds, not by rounding either.
+    derivatives, until the active bounds are found (see ``ActiveBounds``): one to three times from
+    the plan of the previous step of a controller, more from a poor guess. No iterate violates a
+    bound, not by rounding either.
 
-    ``SOLVED`` stands for a strict local minimum of the discretised problem: the unshifted
+    ``SOLVED`` means a strict local minimum of the discretised problem: the unshifted
     recursion has only positive definite Q_uu there, among the controls that are not at a bound
     with a multiplier.
 
@@ -51,12 +52,12 @@ class StagewiseNewton(Solver):
         intervals: number of intervals, with one held control each; a discrete-time problem
             brings its own number.
         integrator: one-step method in each interval.
-        tolerance: of the residual: norm of all gaps, or of the slopes of the Lagrangian
-            relative to 1 + the largest costate; slopes in controls per width of their bounds,
-            where that is less than one.
+        tolerance: of the residual: norm of all defects, or of the Lagrangian's gradient relative
+            to 1 + the largest costate; the gradient in a control is measured per width of its
+            bounds, where that is less than one.
         max_iterations: most Newton steps.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
-            interval is halved; an answer beyond it is ``INACCURATE``.
+            interval is halved; a solution beyond it is ``INACCURATE``.
         compiled: run stages and recursion as machine code; the first build takes seconds, see
             ``compiled``.
     """
@@ -82,8 +83,8 @@ class StagewiseNewton(Solver):
         _refuse(ocp)
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
-        intervals = ShootingGrid.of(ocp, n, self.integrator, fast=fast)
-        return StagewiseNewtonProgram(self, step, intervals)
+        grid = ShootingGrid.of(ocp, n, self.integrator, fast=fast)
+        return StagewiseNewtonProgram(self, step, grid)
 
 
 def _refuse(ocp: OCP) -> None:
@@ -104,12 +105,12 @@ class StagewiseNewtonProgram(Program):
     Attributes:
         solver: the options.
         step: the Newton step.
-        intervals: for first guesses, and to check the integrator.
+        grid: for first iterates, and to check the integrator.
     """
 
     solver: StagewiseNewton
     step: NewtonStep
-    intervals: ShootingGrid
+    grid: ShootingGrid
 
     def run(
         self,
@@ -120,51 +121,51 @@ class StagewiseNewtonProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data."""
-        started = perf_counter()
-        ocp = self.intervals.ocp
+        started, solver, ocp = perf_counter(), self.solver, self.grid.ocp
         data = RunData.of(ocp, x0, t0, parameters)
-        schedule = self.intervals.schedule(data, ocp.duration)
-        final = data.values.at(1.0)[0]
-        solver = self.solver
-        descent = GlobalisedNewton(
-            self.step, [*schedule, final], solver.tolerance, solver.max_iterations
+        schedule = self.grid.schedule(data, ocp.duration)
+        stages_and_end = [*schedule, data.values.at(1.0)[0]]
+        newton = GlobalisedNewton(
+            self.step, stages_and_end, solver.tolerance, solver.max_iterations
         )
-        status = descent.descend(self._first_iterate(data, ocp.first_guess(guess)))
-        found = descent.view
-        x, u = found.at.x.T, found.at.u.T
-        message = descent.message
-        t = data.t0 + self.intervals.fractions * ocp.duration
-        if status.is_success:
-            error, node = self.intervals.error(x, u, schedule)
-            if not error <= solver.accuracy:
-                status = Status.INACCURATE
-                message = f"a state moves by {error:.2g} at t = {t[node]:.4g} s"
+        outcome = newton.solve(self._first_iterate(data, ocp.first_guess(guess)))
+        last = outcome.linearisation
+        t = data.t0 + self.grid.fractions * ocp.duration
+        status, message = self._check_accuracy(outcome, schedule, t)
         return Solution(
             problem=ocp,
             solver=repr(solver),
             status=status,
             message=message,
             t=t,
-            x=x,
+            x=last.at.x.T,
             x0=data.x0,
-            costate=found.at.costate.T,
-            u=u,
-            cost=found.cost if np.isfinite(found.cost) else np.inf,
-            residual=found.residual if found.is_finite else np.inf,
-            iterations=len(descent.costs) - 1,
-            work=Work(descent.views, descent.views, descent.sweeps),
-            history={
-                "cost": np.array(descent.costs),
-                "residual": np.array(descent.residuals),
-            },
+            costate=last.at.costate.T,
+            u=last.at.u.T,
+            cost=last.measures.cost if np.isfinite(last.measures.cost) else np.inf,
+            residual=last.residual if last.is_finite else np.inf,
+            iterations=len(outcome.costs) - 1,
+            work=Work(outcome.evaluations, outcome.evaluations, outcome.riccati_solves),
+            history={"cost": outcome.costs, "residual": outcome.residuals},
             parameters=data.values.as_dict(),
             solve_time=perf_counter() - started,
         )
 
+    def _check_accuracy(
+        self, outcome: NewtonOutcome, schedule: list[np.ndarray], t: np.ndarray
+    ) -> tuple[Status, str]:
+        """Return status and message; a success is ``INACCURATE`` if the integrator's error is."""
+        if outcome.status.is_success:
+            at = outcome.linearisation.at
+            error, node = self.grid.error(at.x.T, at.u.T, schedule)
+            if not error <= self.solver.accuracy:
+                return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t[node]:.4g} s"
+        return outcome.status, outcome.message
+
     def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> Iterate:
-        """Return the guess, from the measured start; costates are zero where there are none."""
-        ocp, nodes = self.intervals.ocp, self.intervals.fractions
-        x, u = self.intervals.first_iterate(data, guess, ocp.duration)
+        """Return the guess with x0 at the start; costates that it lacks are zero."""
+        ocp, nodes = self.grid.ocp, self.grid.fractions
+        x, u = self.grid.first_iterate(data, guess, ocp.duration)
         costate = guess.sample("costate", nodes, ocp.model.nx) if guess else None
         if costate is None:
             costate = np.zeros_like(x)
