@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ocp import Status, Work
-from ocp.internal import ConstraintRow, RunData, start_violation
+from ocp.internal import ConstraintRow, RunData, Violation, start_violation
 from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
 from solvers.direct.nlp_backends import Nlp, NlpResult
 from solvers.direct.transcribed_problem import TranscribedProblem
@@ -236,7 +236,7 @@ class NlpRun:
         if row is None:
             return ""
         t = self.times(result, data)[row.node]
-        return f"'{row.name}' is violated by {violation:.3g} at t = {t:.4g} s"
+        return str(Violation(violation, row, t))
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""
