@@ -23,6 +23,7 @@ from ocp.nlp.transcription import Transcription
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
+from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
@@ -31,9 +32,11 @@ __all__ = [
     "LQData",
     "LinearQuadratic",
     "Matrices",
+    "MethodProgram",
     "ParameterValues",
     "PiecewisePolynomial",
     "RunData",
+    "RunResult",
     "Stage",
     "Transcription",
     "bernstein",

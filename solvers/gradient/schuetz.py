@@ -1,12 +1,9 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
@@ -15,14 +12,19 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Program,
-    Solution,
     Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
-from ocp.internal import RunData, check_instance, check_not_negative, check_whole
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_not_negative,
+    check_whole,
+)
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
 from solvers.gradient.line_search import Armijo, FixedStep, LineSearchTrial, StepRule
@@ -98,7 +100,7 @@ class Schuetz(Solver):
         sweeps = AdjointSweeps.of(
             ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled
         )
-        return SchuetzProgram(self, sweeps)
+        return SchuetzProgram(self, ocp, sweeps)
 
 
 def _refuse_constraints(ocp: OCP) -> None:
@@ -111,45 +113,31 @@ def _refuse_constraints(ocp: OCP) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class SchuetzProgram(Program):
+class SchuetzProgram(MethodProgram):
     """Roll-out and costate sweep of a problem.
 
     Attributes:
-        solver: the options.
         sweeps: both integrations.
     """
 
     solver: Schuetz
     sweeps: AdjointSweeps
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Descend from the guessed controls, zero unless given."""
-        started = perf_counter()
-        ocp = self.sweeps.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        objective, start = Objective(self.sweeps, data), ocp.first_guess(guess)
-        u = start.sample("u", objective.nodes[:-1], ocp.model.nu) if start else None
+        ocp, objective = self.ocp, Objective(self.sweeps, data)
+        u = guess.sample("u", objective.nodes[:-1], ocp.model.nu) if guess else None
         descent = _Descent(
             self.solver, objective, np.zeros((self.sweeps.n, ocp.model.nu)) if u is None else u
         )
         with np.errstate(over="ignore", invalid="ignore"):  # a descent may climb to overflow
             status, message = descent.descend()
         best = descent.here if status is Status.STATIONARY else descent.best
-        return Solution(
-            problem=ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=status,
             message=message,
-            t=t0 + objective.nodes * ocp.duration,
+            t=data.t0 + objective.nodes * ocp.duration,
             x=best.trial.x,
-            x0=data.x0,
             costate=best.costate,
             u=best.trial.u,
             cost=best.trial.cost,
@@ -157,8 +145,6 @@ class SchuetzProgram(Program):
             iterations=len(descent.costs) - 1,
             work=Work(rollouts=objective.rollouts, jacobians=objective.backward),
             history={"cost": np.array(descent.costs), "residual": np.array(descent.residuals)},
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
 

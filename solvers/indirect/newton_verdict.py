@@ -41,11 +41,11 @@ class ExtremalMotion:
         cls, extremals: ExtremalProblem, v: np.ndarray, schedule: ShootingSchedule
     ) -> "ExtremalMotion":
         """Integrate from the unknowns ``v``."""
-        z, _, _, duration = extremals.shape.split(v, schedule.duration)
-        paths = extremals.paths(z, schedule, duration)
-        t, x, costate, u = extremals.trajectory(paths, schedule, duration)
+        at = extremals.shape.split(v, schedule.duration)
+        paths = extremals.paths(at.z, schedule, at.duration)
+        t, x, costate, u = extremals.trajectory(paths, schedule, at.duration)
         end = extremals.ocp.functions.terminal_cost(x[-1], t[-1], schedule.p_last)
-        return cls(paths, duration, t, x, costate, u, float(paths.costs.sum()) + float(end))
+        return cls(paths, at.duration, t, x, costate, u, float(paths.costs.sum()) + float(end))
 
     @property
     def exists(self) -> bool:

@@ -25,7 +25,7 @@ def finer(program: IndirectShootingProgram) -> IndirectShootingProgram:
     """Return the program with half the step."""
     extremals = program.extremals.finer()
     steps = extremals.shape.segments * extremals.steps
-    return IndirectShootingProgram(replace(program.solver, steps=steps), extremals)
+    return IndirectShootingProgram(replace(program.solver, steps=steps), program.ocp, extremals)
 
 
 def change_when_halved(
