@@ -4,11 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
 from ocp.internal import RunData, check_instance, check_positive, check_whole
-from solvers.constrained.multiplier_iteration import MultiplierIteration
+from solvers.constrained.multiplier_iteration import MultiplierIteration, MultiplierResult
+from solvers.constrained.multiplier_round import RelaxedProgram
+from solvers.constrained.multiplier_rule import MultiplierRule
+from solvers.constrained.multiplier_verdict import MultiplierVerdict
 from solvers.constrained.relaxed_problem import RelaxedProblem
 
 
@@ -127,8 +131,31 @@ class AugmentedLagrangianProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         """Alternate between the inner solver and the multipliers."""
-        started = perf_counter()
+        started, s = perf_counter(), self.solver
         data = RunData.of(self.ocp, x0, t0, parameters)
-        ascent = MultiplierIteration(self, data)
-        status, message = ascent.climb(guess)
-        return ascent.solution(status, message, perf_counter() - started)
+        program = RelaxedProgram(self.ocp, self.relaxed, self.inner, s.intervals)
+        rule = MultiplierRule(s.penalty, s.growth, s.largest_penalty, s.tolerance)
+        verdict = MultiplierVerdict(program, rule, s.complementarity)
+        result = MultiplierIteration(program, rule, verdict, s.max_iterations).run(data, guess)
+        return self._solution(result).with_(solve_time=perf_counter() - started)
+
+    def _solution(self, result: MultiplierResult) -> Solution:
+        """Return the last round of a success, the least violating one of a failure."""
+        done = result.rounds
+        shown = done.rounds[-1] if result.status.is_success else done.best or done.lost[-1]
+        return shown.answer.with_(
+            solver=repr(self.solver),
+            status=result.status,
+            message=result.message,
+            cost=shown.verdict.cost,
+            iterations=done.count,
+            work=done.work,
+            history={
+                "multiplier": shown.used.path,
+                "terminal multiplier": shown.used.end,
+                "penalty": np.array([r.used.penalty for r in done.rounds]),
+                "violation": np.array([r.violation for r in done.rounds]),
+                "complementarity": np.array([r.complementarity for r in done.rounds]),
+                "cost": np.array([r.verdict.cost for r in done.rounds]),
+            },
+        )
