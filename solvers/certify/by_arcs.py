@@ -56,7 +56,7 @@ def by_arcs(answer: Solution) -> Estimate:
 
 def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Newton on the minimum principle, steps halved until the referee's cost holds still."""
-    shooting = ArcShooting(ArcConditions(answer, arcs), steps=_STEPS)
+    shooting = ArcShooting(ArcConditions.of(answer, arcs), steps=_STEPS)
     w, before, change = shooting.guess(), np.inf, np.inf
     while True:
         found = shooting.solve(w, _RESIDUAL)
@@ -101,12 +101,12 @@ def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     assert found is not None
     if not verdicts[-1].violation <= _VIOLATION:
         raise NoArcsError(f"{verdicts[-1].worst} is violated by {verdicts[-1].violation:.1e}")
-    cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
+    limit = extrapolated(np.array([v.cost for v in verdicts]))
     return Estimate(
         method=f"direct multiple shooting on {len(arcs)} arcs, {len(found.t) - 1} intervals",
-        cost=cost,
-        error=max(error, BARRIER * len(found.t), verdicts[-1].cost_error),
+        cost=limit.cost,
+        error=max(limit.error, BARRIER * len(found.t), verdicts[-1].cost_error),
         violation=verdicts[-1].violation,
         solution=stretched.trajectory(found),
-        sentence=said,
+        sentence=limit.sentence,
     )

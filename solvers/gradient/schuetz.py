@@ -1,7 +1,7 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from ocp.internal import (
 )
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
-from solvers.gradient.line_search import Armijo, FixedStep, LineSearchTrial, StepRule
+from solvers.gradient.line_search import AcceptedStep, Armijo, FixedStep, StepRule
 
 
 @dataclass(frozen=True)
@@ -130,26 +130,44 @@ class SchuetzProgram(MethodProgram):
         descent = _Descent(
             self.solver, objective, np.zeros((self.sweeps.n, ocp.model.nu)) if u is None else u
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # a descent may climb to overflow
-            status, message = descent.descend()
-        best = descent.here if status is Status.STATIONARY else descent.best
+        with np.errstate(over="ignore", invalid="ignore"):  # the cost may rise until it overflows
+            found = descent.run()
+        shown = found.iterate
         return RunResult(
-            status=status,
-            message=message,
+            status=found.status,
+            message=found.message,
             t=data.t0 + objective.nodes * ocp.duration,
-            x=best.trial.x,
-            costate=best.costate,
-            u=best.trial.u,
-            cost=best.trial.cost,
-            residual=objective.residual(best),
-            iterations=len(descent.costs) - 1,
+            x=shown.trial.x,
+            costate=shown.costate,
+            u=shown.trial.u,
+            cost=shown.trial.cost,
+            residual=objective.residual(shown),
+            iterations=len(found.costs) - 1,
             work=Work(rollouts=objective.rollouts, jacobians=objective.backward),
-            history={"cost": np.array(descent.costs), "residual": np.array(descent.residuals)},
+            history={"cost": np.array(found.costs), "residual": np.array(found.residuals)},
         )
 
 
+class _DescentResult(NamedTuple):
+    """How a descent ended.
+
+    Attributes:
+        status: the termination test that held.
+        message: what the status alone does not say.
+        iterate: the last one where it is stationary, else the one with the least cost.
+        costs: of the iterates.
+        residuals: largest projected gradient of each.
+    """
+
+    status: Status
+    message: str
+    iterate: ControlIterate
+    costs: list[float]
+    residuals: list[float]
+
+
 class _Descent:
-    """Algorithm 2 from some controls: where it is, where the cost was least, how it got there."""
+    """Algorithm 2 from some controls: the iterate, the best one so far, and their history."""
 
     def __init__(self, solver: Schuetz, objective: Objective, u: np.ndarray) -> None:
         self.solver, self.objective = solver, objective
@@ -157,8 +175,13 @@ class _Descent:
         self.costs = [self.here.trial.cost]
         self.residuals = [objective.residual(self.here)]
 
-    def descend(self) -> tuple[Status, str]:
-        """Iterate until a termination test holds; return which, with what there is to say."""
+    def run(self) -> _DescentResult:
+        """Iterate until a termination test holds."""
+        status, message = self._iterate()
+        shown = self.here if status is Status.STATIONARY else self.best
+        return _DescentResult(status, message, shown, self.costs, self.residuals)
+
+    def _iterate(self) -> tuple[Status, str]:
         if not self.here.is_finite:
             return Status.DIVERGED, "the first controls make the state or its costate blow up"
         objective, last = self.objective, None
@@ -171,8 +194,8 @@ class _Descent:
             accepted = self._advance(s, slope, self._first_step(s, slope, last))
             if accepted is None:
                 return Status.NO_PROGRESS, f"projected gradient {self.residuals[-1]:.3g}"
-            trial, step = accepted
-            here, last = objective.differentiated(trial), DescentStep(g, s, slope, step)
+            here = objective.differentiated(accepted.trial)
+            last = DescentStep(g, s, slope, accepted.step)
             if not here.is_finite:
                 done = len(self.costs)
                 return Status.DIVERGED, f"after {done} iterations the state or its costate blows up"
@@ -187,9 +210,7 @@ class _Descent:
         """Whether no component of the projected gradient is left."""
         return self.residuals[-1] <= self.solver.stationarity
 
-    def _advance(
-        self, s: np.ndarray, slope: float, first: float
-    ) -> tuple[LineSearchTrial, float] | None:
+    def _advance(self, s: np.ndarray, slope: float, first: float) -> AcceptedStep | None:
         """Roll out u + step s, with the step that the rule accepts."""
         u, cost = self.here.trial.u, self.here.trial.cost
         return self.solver.step.advance(

@@ -1,7 +1,6 @@
 """The batch approach: all inputs of a linear-quadratic problem from one linear system."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -51,10 +50,8 @@ class Batch(Solver):
         """Stack and factorise."""
         lq = linear_quadratic(ocp)
         recursion.refuse_constraints(lq, "Batch")
-        program = BatchProgram(self, ocp, lq)
-        if lq.fixed is not None:
-            _ = program.fixed
-        return program
+        fixed = None if lq.fixed is None else _stacked(self, ocp, lq.fixed)
+        return BatchProgram(self, ocp, lq, fixed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +60,18 @@ class _Stacked:
 
     prediction: StackedPrediction
     factor: tuple[np.ndarray, bool] | None
+
+
+def _stacked(solver: Batch, ocp: OCP, matrices: Matrices) -> _Stacked:
+    steps, n, m = matrices.B.shape
+    feedback = np.zeros((steps, m, n))
+    if solver.prestabilise:
+        feedback = recursion.stabilising(matrices, ocp.name)
+    prediction = StackedPrediction.of(matrices, feedback)
+    try:
+        return _Stacked(prediction, cho_factor(prediction.hessian))
+    except (LinAlgError, ValueError):  # not positive definite, or not finite
+        return _Stacked(prediction, None)
 
 
 class _Minimiser(NamedTuple):
@@ -80,26 +89,25 @@ class BatchProgram(MethodProgram):
 
     Attributes:
         lq: the problem as arrays.
+        fixed: the stacked matrices, where neither time nor parameters change them.
     """
 
     solver: Batch
     lq: LinearQuadratic
+    fixed: _Stacked | None
 
     @property
     def prediction(self) -> StackedPrediction:
         """The stacked matrices with the declared parameters."""
-        stacked = self.fixed or self._stack(self.lq.on(self.lq.declared).matrices)
+        stacked = self.fixed or _stacked(
+            self.solver, self.ocp, self.lq.on(self.lq.declared).matrices
+        )
         return stacked.prediction
-
-    @cached_property
-    def fixed(self) -> _Stacked | None:
-        """The stacked matrices, where neither time nor parameters change them."""
-        return None if self.lq.fixed is None else self._stack(self.lq.fixed)
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; a guess is not needed."""
         numbers = self.lq.on(data)
-        stacked = self.fixed or self._stack(numbers.matrices)
+        stacked = self.fixed or _stacked(self.solver, self.ocp, numbers.matrices)
         x, u, status, message = self._minimiser(stacked, numbers, data.x0)
         n, m = x.shape[1], numbers.matrices
         half = recursion.half_slopes(numbers, x, u)
@@ -120,17 +128,6 @@ class BatchProgram(MethodProgram):
             iterations=1,
             work=Work(rollouts=1, factorisations=1),
         )
-
-    def _stack(self, matrices: Matrices) -> _Stacked:
-        steps, n, m = matrices.B.shape
-        feedback = np.zeros((steps, m, n))
-        if self.solver.prestabilise:
-            feedback = recursion.stabilising(matrices, self.lq.ocp.name)
-        prediction = StackedPrediction.of(matrices, feedback)
-        try:
-            return _Stacked(prediction, cho_factor(prediction.hessian))
-        except (LinAlgError, ValueError):  # not positive definite, or not finite
-            return _Stacked(prediction, None)
 
     def _minimiser(self, stacked: _Stacked, data: LQData, x0: np.ndarray) -> _Minimiser:
         prediction = stacked.prediction

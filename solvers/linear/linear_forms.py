@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from ocp.internal import LinearQuadratic, LQData, Matrices
 from solvers.linear import regulator_gains as recursion
+from solvers.linear.qp.quadratic_program import QpVectors
 from solvers.linear.stacked_prediction import StackedPrediction
 
 # A point as (x (N + 1, n), u (N, m)).
@@ -20,14 +21,6 @@ class FormPosition(NamedTuple):
     name: str
     node: int
     is_control_bound: bool
-
-
-class FormVectors(NamedTuple):
-    """What changes from run to run: g, and the bounds l and u of the rows."""
-
-    g: np.ndarray
-    l: np.ndarray  # noqa: E741
-    u: np.ndarray
 
 
 class MPCForm(ABC):
@@ -62,7 +55,7 @@ class MPCForm(ABC):
         """Fill H and G."""
 
     @abstractmethod
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
 
     @abstractmethod
@@ -158,7 +151,7 @@ class Sparse(MPCForm):
             _Block(end, self._after[-1:], m.D_f[None]),
         ]
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
         m, on, first = data.matrices, self.lq.on_control, int(self.lq.on_control.sum())
         g = np.empty(self._size)
@@ -172,9 +165,7 @@ class Sparse(MPCForm):
         known = m.D_x[0, on] @ x0
         low[:first] -= known
         high[:first] -= known
-        return FormVectors(
-            g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high])
-        )
+        return QpVectors(g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high]))
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""
@@ -218,14 +209,14 @@ class Condensed(MPCForm):
         assert self._prediction is not None
         return self._prediction
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
         m, on = data.matrices, self.lq.on_control
         z, x_end = self._stacked.nominal(data, x0)
         rows = (m.D @ z[:, :, None])[:, :, 0]
         known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
         low, high = self._bounds(data)
-        return FormVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
+        return QpVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""

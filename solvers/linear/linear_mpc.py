@@ -202,7 +202,7 @@ class LinearMPCProgram(MethodProgram):
         hard = w.hard.with_vectors(*vectors)
         if self.softening is None:
             return hard, hard
-        return hard, w.soft.with_vectors(*self.softening.bounds(*vectors))
+        return hard, w.soft.with_vectors(*self.softening.soften_vectors(vectors))
 
     def _warm_start(self, guess: InitialGuess | None, numbers: LQData, qp: QP) -> np.ndarray | None:
         if guess is None:

@@ -55,10 +55,8 @@ class Riccati(Solver):
         problem = with_stationary_end(ocp) if self.horizon == "infinite" else ocp
         lq = linear_quadratic(problem)
         recursion.refuse_constraints(lq, "Riccati")
-        program = RiccatiProgram(self, lq.ocp, lq)
-        if lq.fixed is not None:
-            _ = program.fixed_gains
-        return program
+        fixed = None if lq.fixed is None else recursion.regulator_gains(lq.fixed)
+        return RiccatiProgram(self, lq.ocp, lq, fixed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +65,12 @@ class RiccatiProgram(MethodProgram):
 
     Attributes:
         lq: the problem as arrays.
+        fixed_gains: the gains, where neither time nor parameters change them.
     """
 
     solver: Riccati
     lq: LinearQuadratic
+    fixed_gains: recursion.RegulatorGains | None
 
     @property
     def P(self) -> np.ndarray:
@@ -86,11 +86,6 @@ class RiccatiProgram(MethodProgram):
     def k(self) -> np.ndarray:
         """Feed-forward k_k of u = -K x - k with the declared parameters, (N, m)."""
         return recursion.affine_parts(self._declared, self.lq.on(self.lq.declared))[1]
-
-    @cached_property
-    def fixed_gains(self) -> recursion.RegulatorGains | None:
-        """The gains, where neither time nor parameters change them."""
-        return None if self.lq.fixed is None else recursion.regulator_gains(self.lq.fixed)
 
     @cached_property
     def _declared(self) -> recursion.RegulatorGains:

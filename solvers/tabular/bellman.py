@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
-from ocp import OCP, Constraint, Integrator, Signal
-from ocp.internal import RunData, Stage
-from solvers.tabular.columns import Columns
+from ocp import OCP, Constraint
+from ocp.internal import RunData
+from solvers.tabular.grid_functions import GridFunctions
 from solvers.tabular.state_grid import StateGrid
 
 # A bound or constraint counts as met within this, relative to 1 + abs(bound): rounding only.
@@ -78,7 +77,7 @@ class Bellman:
         grid: the points of the states.
         controls: the controls that are tried.
         n: number of steps.
-        integrator: one-step method of a continuous model.
+        functions: of a step, and of the last node.
         slack: by how much a terminal constraint may be missed.
     """
 
@@ -86,7 +85,7 @@ class Bellman:
     grid: StateGrid
     controls: StateGrid
     n: int
-    integrator: Integrator
+    functions: GridFunctions
     slack: float
 
     # -- the recursion --------------------------------------------------------------------
@@ -98,13 +97,13 @@ class Bellman:
         policy = np.empty((self.n, self.grid.size, self.ocp.model.nu))
         value[-1] = self.final(data)
         x, u = self._all_pairs()
-        moves, pays = self._varies
+        f = self.functions
         after, cost = self.step(x, u, common[-1], first=False)
         matrix, inside = self.grid.interpolation(after)
         for k in reversed(range(self.n)):
-            if k < self.n - 1 and (moves or pays):
+            if k < self.n - 1 and (f.moves or f.pays):
                 after, cost = self.step(x, u, common[k], first=False)
-            if k < self.n - 1 and moves:
+            if k < self.n - 1 and f.moves:
                 matrix, inside = self.grid.interpolation(after)
             cost[~inside] = np.inf
             total = (matrix @ value[k + 1] + cost).reshape(self.grid.size, -1)
@@ -115,10 +114,10 @@ class Bellman:
         """Return the cost of the last node on the terminal set, inf outside it (2.30, 2.31)."""
         x, p = self.grid.points, data.values.at(1.0)[0]
         t = np.array([data.t0 + self.ocp.duration])
-        cost = self._terminal_cost([x], [t, p])[:, 0]
+        cost = self.functions.terminal_cost([x], [t, p])[:, 0]
         met = self._in_state_bounds(x)
-        met &= _met(self._last([x], [t, p]), self._resting)
-        met &= _met(self._terminal([x], [t, p]), self.ocp.at("terminal"), self.slack)
+        met &= _met(self.functions.last([x], [t, p]), self.functions.resting)
+        met &= _met(self.functions.terminal([x], [t, p]), self.ocp.at("terminal"), self.slack)
         return np.where(met & np.isfinite(cost), cost, np.inf)
 
     def minimum(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,9 +161,10 @@ class Bellman:
             common: t, h, p0 and p1 of the step.
             first: whether x is the start: what it alone decides is then not imposed.
         """
-        stepped = self._step([x, u], common)
-        path = self._path([x, u], [common[0], common[2]])
-        counted = self._depends if first else np.ones(len(self._depends), dtype=bool)
+        stepped = self.functions.step([x, u], common)
+        path = self.functions.path([x, u], [common[0], common[2]])
+        on_control = self.functions.on_control
+        counted = on_control if first else np.ones(len(on_control), dtype=bool)
         lower, upper = _bounds(self.ocp.at("path"))
         met = _within(path[:, counted], lower[counted], upper[counted], 0.0)
         if not first:
@@ -184,81 +184,6 @@ class Bellman:
     def _in_state_bounds(self, x: np.ndarray) -> np.ndarray:
         box = self.ocp.state_bounds
         return _within(x, np.asarray(box.lower), np.asarray(box.upper), 0.0)
-
-    # -- functions, built once --------------------------------------------------------------
-
-    def prepare(self) -> "Bellman":
-        """Build every Function now, and return self."""
-        _ = self._step, self._varies, self._path, self._last, self._terminal, self._terminal_cost
-        return self
-
-    @cached_property
-    def _stage(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
-        """Symbols of a step, and state and cost after it."""
-        step = Stage.of(self.ocp, self.integrator, held=True).step
-        symbols = [ca.SX.sym(step.name_in(i), *step.size_in(i)) for i in range(step.n_in())]
-        after, cost = step(*symbols)
-        return symbols, after, cost
-
-    @cached_property
-    def _varies(self) -> tuple[bool, bool]:
-        """Whether the next state, and cost or constraints, depend on time or on a signal."""
-        entries = self.ocp.parameters
-        moving = [isinstance(e, Signal) for e in entries for _ in range(e.symbol.numel())]
-        kept = np.flatnonzero(moving).tolist()
-        (_, _, t, _, p0, p1), after, cost = self._stage
-        timely = ca.vertcat(t, p0[kept], p1[kept]) if kept else t
-        m = self.ocp.model
-        timely_path = ca.vertcat(m.t, self.ocp.p[kept]) if kept else m.t
-        path = ca.vertcat(ca.SX(0, 1), *[c.expression for c in self.ocp.at("path")])
-        on_path = path.numel() > 0 and ca.depends_on(path, timely_path)
-        return ca.depends_on(after, timely), ca.depends_on(cost, timely) or on_path
-
-    @cached_property
-    def _step(self) -> Columns:
-        symbols, after, cost = self._stage
-        return Columns(ca.Function("step", symbols, [ca.densify(ca.vertcat(after, cost))]), 2)
-
-    @cached_property
-    def _path(self) -> Columns:
-        m = self.ocp.model
-        path = ca.vertcat(ca.SX(0, 1), *[c.expression for c in self.ocp.at("path")])
-        return Columns(ca.Function("path", [m.x, m.u, m.t, self.ocp.p], [ca.densify(path)]), 2)
-
-    @cached_property
-    def _depends(self) -> np.ndarray:
-        """Which rows of the path constraints contain a control."""
-        u, rows = self.ocp.model.u, [c.expression for c in self.ocp.at("path")]
-        path = ca.vertcat(ca.SX(0, 1), *rows)
-        return np.array([ca.depends_on(path[i], u) for i in range(path.numel())], dtype=bool)
-
-    @cached_property
-    def _resting(self) -> tuple[Constraint, ...]:
-        """The rows of the path constraints without a control: they hold at the last node too."""
-        rows, i = [], 0
-        for c in self.ocp.at("path"):
-            lower, upper = np.asarray(c.lower), np.asarray(c.upper)
-            for j in range(c.size):
-                if not self._depends[i]:
-                    rows.append(Constraint(c.name, c.expression[j], lower[j], upper[j]))
-                i += 1
-        return tuple(rows)
-
-    @cached_property
-    def _last(self) -> Columns:
-        return self._at_end("last", [c.expression for c in self._resting])
-
-    @cached_property
-    def _terminal(self) -> Columns:
-        return self._at_end("terminal", [c.expression for c in self.ocp.at("terminal")])
-
-    @cached_property
-    def _terminal_cost(self) -> Columns:
-        return self._at_end("terminal_cost", [ca.SX(self.ocp.terminal_cost)])
-
-    def _at_end(self, name: str, rows: list[ca.SX]) -> Columns:
-        m, column = self.ocp.model, ca.densify(ca.vertcat(ca.SX(0, 1), *rows))
-        return Columns(ca.Function(name, [m.x, m.t, self.ocp.p], [column]), 1)
 
 
 def _vertex(

@@ -166,14 +166,17 @@ class GreedyProgram(MethodProgram):
 
     def _choose(self, walk: _Walk, k: int, u: np.ndarray, here: np.ndarray, t: float) -> np.ndarray:
         problem = self.last if k == self.n - 1 else self.inner
-        found, broken, stats = problem.solve(u, here, self.ocp.control_bounds)
-        walk.iterations += int(stats.get("iter_count", 0))
-        if broken or not stats.get("success"):
-            word = str(stats.get("return_status", ""))
-            walk.status = _status(broken, word)
-            why = f"no control keeps {broken}" if broken else f"the backend says {word}"
+        found = problem.solve(u, here, self.ocp.control_bounds)
+        walk.iterations += found.iterations
+        if found.broken or not found.success:
+            walk.status = _status(found.broken, found.word)
+            why = (
+                f"no control keeps {found.broken}"
+                if found.broken
+                else f"the backend says {found.word}"
+            )
             walk.message = f"step {k}, t = {t:.4g} s: {why}; the control is held from there"
-        return found
+        return found.u
 
     def _blown_up(self, walk: _Walk, u: np.ndarray, t: float) -> _Walk:
         rest = self.n - len(walk.u)

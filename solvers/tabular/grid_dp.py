@@ -27,6 +27,7 @@ from ocp.internal import (
     check_whole,
 )
 from solvers.tabular.bellman import Bellman, ValueFunction
+from solvers.tabular.grid_functions import GridFunctions
 from solvers.tabular.policy_run import PolicyRun, follow_policy
 from solvers.tabular.refusal import refuse_free_ends
 from solvers.tabular.state_grid import Axis, StateGrid
@@ -98,10 +99,11 @@ class GridDP(Solver):
         controls = _grid(self.controls, ocp.control_bounds, m.u_names, "controls")
         self._check_memory(ocp, states, controls)
         n = ocp.steps or self.intervals
-        fine = Bellman(ocp, states, controls, n, self.integrator, self.terminal_slack)
+        functions = GridFunctions.of(ocp, self.integrator)
+        fine = Bellman(ocp, states, controls, n, functions, self.terminal_slack)
         half = replace(fine, grid=states.coarser, controls=controls.coarser)
         quarter = replace(fine, grid=half.grid.coarser, controls=half.controls.coarser)
-        return GridDPProgram(self, ocp, tuple(b.prepare() for b in (quarter, half, fine)))
+        return GridDPProgram(self, ocp, (quarter, half, fine))
 
     def _refuse_equations(self, ocp: OCP) -> None:
         for c in (*ocp.at("path"), *ocp.at("terminal")):

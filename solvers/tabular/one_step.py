@@ -1,7 +1,7 @@
 """The problem of one step: the best input for it, and the constraints of where it leads."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -11,6 +11,24 @@ from ocp.internal import Stage
 
 # Beyond this a constraint counts as violated, whatever the backend says.
 _VIOLATED = 1e-6
+
+
+class StepControl(NamedTuple):
+    """The control of one step.
+
+    Attributes:
+        u: control (nu,), within its bounds.
+        broken: which constraint it breaks, and by how much; empty if none.
+        success: whether the backend says so.
+        word: how the backend says that it ended.
+        iterations: of the backend.
+    """
+
+    u: np.ndarray
+    broken: str
+    success: bool
+    word: str
+    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,22 +49,26 @@ class OneStep:
     lower: np.ndarray
     upper: np.ndarray
 
-    def solve(
-        self, u: np.ndarray, data: np.ndarray, box: Box
-    ) -> tuple[np.ndarray, str, dict[str, Any]]:
-        """Return the control, which constraint it breaks (or nothing), and the statistics."""
+    def solve(self, u: np.ndarray, data: np.ndarray, box: Box) -> StepControl:
+        """Return the best control of a step, from a first guess of it."""
         limits = {"lbx": np.asarray(box.lower), "ubx": np.asarray(box.upper)}
         answer: Any = self.nlp(x0=u, p=data, lbg=self.lower, ubg=self.upper, **limits)
         found = np.array(answer["x"]).ravel()
         g = np.array(self.rows(found, data)).ravel()
         stats = self.nlp.stats()
+        ended = (
+            bool(stats.get("success")),
+            str(stats.get("return_status", "")),
+            int(stats.get("iter_count", 0)),
+        )
         if not np.isfinite(found).all() or not np.isfinite(g).all():
-            return box.clip(u), "a number that is not finite", stats
+            return StepControl(box.clip(u), "a number that is not finite", *ended)
         excess = np.maximum(self.lower - g, g - self.upper)
         if excess.max(initial=0.0) > _VIOLATED * (1.0 + np.abs(g).max(initial=0.0)):
             worst = int(excess.argmax())
-            return box.clip(found), f"'{self.names[worst]}' by {excess[worst]:.3g}", stats
-        return box.clip(found), "", stats
+            broken = f"'{self.names[worst]}' by {excess[worst]:.3g}"
+            return StepControl(box.clip(found), broken, *ended)
+        return StepControl(box.clip(found), "", *ended)
 
 
 def one_step(ocp: OCP, stage: Stage, options: dict[str, Any], *, last: bool) -> OneStep:

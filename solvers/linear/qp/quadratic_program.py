@@ -27,6 +27,14 @@ class Products(NamedTuple):
         return cls(h.tocsr(), g.tocsr(), g.T.tocsr())
 
 
+class QpVectors(NamedTuple):
+    """What changes from run to run: g, and the bounds l and u of the rows."""
+
+    g: np.ndarray
+    l: np.ndarray  # noqa: E741
+    u: np.ndarray
+
+
 class QP(NamedTuple):
     r"""A convex quadratic program.
 
@@ -133,15 +141,14 @@ class Softening:
             sp.csc_matrix(rows),
         )
 
-    def bounds(
-        self, g: np.ndarray, low: np.ndarray, high: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def soften_vectors(self, vectors: QpVectors) -> QpVectors:
         """Return g, l and u of the program with slacks."""
+        g, low, high = vectors
         count = len(self.rows)
         hard = low.copy()
         hard[self.rows] = -np.inf
         free = np.full(count, np.inf)
-        return (
+        return QpVectors(
             np.concatenate([g, np.full(count, self.price)]),
             np.concatenate([hard, low[self.rows], np.zeros(count)]),
             np.concatenate([high, free, free]),

@@ -1,0 +1,88 @@
+"""The functions of a problem that dynamic programming on a grid evaluates, built once."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ocp import OCP, Constraint, Integrator, Signal
+from ocp.internal import Stage
+from solvers.tabular.columns import Columns
+
+
+@dataclass(frozen=True, eq=False)
+class GridFunctions:
+    """The functions of a step, and of the last node.
+
+    Attributes:
+        step: (x, u; t, h, p0, p1) -> state and cost after it.
+        path: (x, u; t, p) -> path constraints.
+        last: (x; t, p) -> ``resting`` at the last node.
+        terminal: (x; t, p) -> terminal constraints.
+        terminal_cost: (x; t, p) -> phi.
+        on_control: which rows of the path constraints contain a control.
+        resting: the other rows: they hold at the last node too.
+        moves: whether the state after a step depends on time or on a signal.
+        pays: whether its cost or a path constraint does.
+    """
+
+    step: Columns
+    path: Columns
+    last: Columns
+    terminal: Columns
+    terminal_cost: Columns
+    on_control: np.ndarray
+    resting: tuple[Constraint, ...]
+    moves: bool
+    pays: bool
+
+    @classmethod
+    def of(cls, ocp: OCP, integrator: Integrator) -> "GridFunctions":
+        """Build all of them; ``integrator``: of a continuous model."""
+        m, stage = ocp.model, Stage.of(ocp, integrator, held=True).step
+        symbols = [ca.SX.sym(stage.name_in(i), *stage.size_in(i)) for i in range(stage.n_in())]
+        after, cost = stage(*symbols)
+        step = ca.Function("step", symbols, [ca.densify(ca.vertcat(after, cost))])
+        path = ca.vertcat(ca.SX(0, 1), *[c.expression for c in ocp.at("path")])
+        rows = [ca.depends_on(path[i], m.u) for i in range(path.numel())]
+        on_control = np.array(rows, dtype=bool)
+        resting = _resting(ocp, on_control)
+        _, _, t, _, p0, p1 = symbols
+        signals = _signals(ocp)
+        timely = ca.vertcat(t, p0[signals], p1[signals]) if signals else t
+        timely_path = ca.vertcat(m.t, ocp.p[signals]) if signals else m.t
+        on_path = path.numel() > 0 and ca.depends_on(path, timely_path)
+        return cls(
+            step=Columns(step, 2),
+            path=Columns(ca.Function("path", [m.x, m.u, m.t, ocp.p], [ca.densify(path)]), 2),
+            last=_at_end(ocp, "last", [c.expression for c in resting]),
+            terminal=_at_end(ocp, "terminal", [c.expression for c in ocp.at("terminal")]),
+            terminal_cost=_at_end(ocp, "terminal_cost", [ca.SX(ocp.terminal_cost)]),
+            on_control=on_control,
+            resting=resting,
+            moves=ca.depends_on(after, timely),
+            pays=ca.depends_on(cost, timely) or on_path,
+        )
+
+
+def _signals(ocp: OCP) -> list[int]:
+    """Which parameters may change along the horizon."""
+    moving = [isinstance(e, Signal) for e in ocp.parameters for _ in range(e.symbol.numel())]
+    return np.flatnonzero(moving).tolist()
+
+
+def _resting(ocp: OCP, on_control: np.ndarray) -> tuple[Constraint, ...]:
+    """The rows of the path constraints without a control."""
+    rows, i = [], 0
+    for c in ocp.at("path"):
+        lower, upper = np.asarray(c.lower), np.asarray(c.upper)
+        for j in range(c.size):
+            if not on_control[i]:
+                rows.append(Constraint(c.name, c.expression[j], lower[j], upper[j]))
+            i += 1
+    return tuple(rows)
+
+
+def _at_end(ocp: OCP, name: str, rows: list[ca.SX]) -> Columns:
+    m, column = ocp.model, ca.densify(ca.vertcat(ca.SX(0, 1), *rows))
+    return Columns(ca.Function(name, [m.x, m.t, ocp.p], [column]), 1)
