@@ -95,14 +95,14 @@ class ArcShooting:
         )
 
     def wrong_signs(self, trajectory: Solution) -> float:
-        """By how much H_u pulls a control off a law that holds it, relative to 1 + abs(H_u)."""
+        """Return the largest law multiplier of a wrong sign, relative to 1 + the largest of all."""
         worst, largest, pieces = 0.0, 0.0, self.nodes * self.steps
         for i, values in enumerate(self.conditions.law_multipliers):
             at = slice(i * pieces, (i + 1) * pieces + 1)
             z = np.hstack([trajectory.x[at], trajectory.costate[at]]).T
-            pulled = np.array(values.map(z.shape[1])(z, trajectory.t[at][None]))
-            worst = max(worst, float(pulled.max(initial=0.0)))
-            largest = max(largest, float(np.abs(pulled).max(initial=0.0)))
+            values_along = np.array(values.map(z.shape[1])(z, trajectory.t[at][None]))
+            worst = max(worst, float(values_along.max(initial=0.0)))
+            largest = max(largest, float(np.abs(values_along).max(initial=0.0)))
         return worst / (1.0 + largest)
 
     # -- the equations ----------------------------------------------------------------
@@ -140,8 +140,8 @@ class ArcShooting:
         z[0, : ocp.model.nx] = start.data.x0
         last = np.concatenate([start.x[-1], start.costate[-2]])
         by_cost, by_end = (np.array(v) for v in self.conditions.ends.call([last, start.t[-1]]))
-        gap = start.costate[-2] - by_cost.ravel()
-        nu = np.linalg.lstsq(by_end.T, gap, rcond=None)[0] if by_end.size else np.empty(0)
+        defect = start.costate[-2] - by_cost.ravel()
+        nu = np.linalg.lstsq(by_end.T, defect, rcond=None)[0] if by_end.size else np.empty(0)
         return np.concatenate([z.ravel(), start.duration * np.diff(edges), nu])
 
     def solve(self, guess: np.ndarray, tolerance: float) -> NewtonResult:

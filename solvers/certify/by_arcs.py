@@ -1,4 +1,4 @@
-"""What the arcs of a trajectory make of the optimal value: switches are met exactly."""
+"""The optimal value by shooting over the arcs of a trajectory, with its switches as unknowns."""
 
 from dataclasses import replace
 
@@ -90,11 +90,11 @@ def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
 
 def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Durations and held controls by multiple shooting, on grids doubled on every arc."""
-    stretched, verdicts = TimeScaledProblem(answer, arcs), []
-    ocp, found = stretched.ocp, None
+    scaled, verdicts = TimeScaledProblem(answer, arcs), []
+    ocp, found = scaled.ocp, None
     for intervals in _INTERVALS:
         program = MultipleShooting(intervals * len(arcs), tolerance=BARRIER).build(ocp)
-        found = program.run(parameters=answer.parameters, guess=found or stretched.guess)
+        found = program.run(parameters=answer.parameters, guess=found or scaled.guess)
         if not found.status.is_success:
             raise NoArcsError(f"{found.status.value}. {found.message}")
         verdicts.append(evaluate(found, tolerance=TOLERANCE))
@@ -107,6 +107,6 @@ def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
         cost=limit.cost,
         error=max(limit.error, BARRIER * len(found.t), verdicts[-1].cost_error),
         violation=verdicts[-1].violation,
-        solution=stretched.trajectory(found),
+        solution=scaled.trajectory(found),
         sentence=limit.sentence,
     )

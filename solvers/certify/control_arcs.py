@@ -1,4 +1,4 @@
-"""Of which arcs a trajectory is made: which control follows which law, and until when."""
+"""The arcs of a trajectory: which control follows which law, and until when."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

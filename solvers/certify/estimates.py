@@ -1,4 +1,4 @@
-"""What independent methods make of an optimal value, each with an error estimate of its own."""
+"""The optimal value by independent methods, each with its own error estimate."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,7 +35,7 @@ _INTERVALS = 9
 BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
 # A cost that changes by less from mesh to mesh, relative, is at its limit.
 _SETTLED = 1e-11
-# Refinement that ends above its accuracy leaves the rest to the cuts where the control bends.
+# Refinement that ends above its accuracy leaves the rest to ``local_error``.
 _LEFT = 1e-6
 _MOST_INTERVALS = 1000
 

@@ -111,12 +111,12 @@ class CollocationProgram(Program):
     Attributes:
         solver: the options.
         transcription: the problem on its points.
-        gaps: the dynamics between the nodes.
+        defects: the dynamics between the nodes.
     """
 
     solver: Collocation
     transcription: CollocatedProblem
-    gaps: Defects
+    defects: Defects
 
     def run(
         self,
@@ -151,7 +151,7 @@ class CollocationProgram(Program):
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
         if x is None:
-            x = self.gaps.rollout(self._elevated(c), duration, data)
+            x = self.defects.rollout(self._elevated(c), duration, data)
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (len(grid.nodes), 1))
         z = x[grid.edge_nodes].T
@@ -177,7 +177,7 @@ class CollocationProgram(Program):
     def _error(self, answer: NlpResult, data: RunData) -> tuple[float, int]:
         w, tr = answer.w, self.transcription
         u = self._elevated(tr.split(w).c.T)
-        moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
+        moved, _ = self.defects.relative(self._states(w), u, tr.duration(w), data)
         worst = int(moved.argmax())
         return float(moved[worst]), worst + 1
 

@@ -1,4 +1,4 @@
-"""The augmented Lagrangian: constraints for solvers that know none, held between the nodes."""
+"""The augmented Lagrangian: constraints for solvers that take none, met between the nodes too."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from solvers.constrained.relaxed_problem import RelaxedProblem
 
 @dataclass(frozen=True)
 class AugmentedLagrangian(Solver):
-    r"""Turn constraints into costs, and the costs into constraints again, round by round.
+    r"""Put constraints into the cost, and update multipliers and penalty until they are met.
 
     The relaxed problem (see ``RelaxedProblem``) is built once by the inner solver. After each of
     its runs the *referee* integrates the controls, and the multipliers at the nodes follow
@@ -34,10 +34,10 @@ class AugmentedLagrangian(Solver):
     It relaxes path constraints, state bounds and terminal constraints, of which a relaxed
     problem has none left; initial constraints, control bounds and a free final time stay with
     the inner solver, which may refuse them. It succeeds when the referee's violation is within
-    the tolerance, the complementarity is small and the inner solver stands behind its last
+    the tolerance, the complementarity is small and the inner solver succeeds in its last
     run; it is ``INFEASIBLE`` when the start itself violates a constraint, or, a local verdict,
     when a violation stays although the multipliers' term has outgrown the cost, and the inner
-    solver stands behind most of its runs.
+    solver succeeds in most of its runs.
 
     The multipliers are in ``history``: ``"multiplier"`` (N + 1, m) per second, at the nodes,
     and ``"terminal multiplier"``; per round ``"violation"``, ``"complementarity"``,

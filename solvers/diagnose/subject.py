@@ -10,7 +10,7 @@ from ocp import OCP, Solution
 from ocp.internal import RunData
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
-# Random points around the guess, for what must hold wherever one looks.
+# Random points around the guess, for what must hold everywhere.
 _RANDOM = 20
 # Intervals of the elastic problem, which is solved a dozen times.
 _COARSE = 30

@@ -1,4 +1,4 @@
-"""How far a gradient method goes along a direction."""
+"""Step rules of a gradient method: a fixed step, or backtracking to a sufficient decrease."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

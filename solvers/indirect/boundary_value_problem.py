@@ -84,7 +84,7 @@ class ExtremalProblem:
     def residual(
         self, v: np.ndarray, schedule: ShootingSchedule, x0: np.ndarray
     ) -> tuple[np.ndarray, SegmentTrajectories]:
-        """Return start conditions, gaps between segments, end conditions; and the paths."""
+        """Return start conditions, defects between segments, end conditions; and the paths."""
         z, mu, nu, duration = self.shape.split(v, schedule.duration)
         paths = self.paths(z, schedule, duration)
         end = self.ends(paths.ends[-1], nu, schedule.t0 + duration, schedule.p_last)[0]

@@ -1,4 +1,4 @@
-"""What Newton's last iterate is: an extremal as asked for, or what it lacks."""
+"""Status of Newton's last iterate: an extremal, or why it is none."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _CONCAVE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ExtremalMotion:
-    """The trajectory that unknowns stand for.
+    """The trajectory of given unknowns.
 
     Attributes:
         paths: its segments.

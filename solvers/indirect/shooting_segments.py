@@ -1,4 +1,4 @@
-"""A horizon cut into segments: when they integrate, what is unknown, what comes out."""
+"""A horizon cut into segments: their schedule, the unknowns, and the trajectories."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

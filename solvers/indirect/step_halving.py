@@ -1,4 +1,4 @@
-"""What half the integration steps would change about an extremal, without solving again."""
+"""By how much half the integration step would change an extremal, without solving again."""
 
 from dataclasses import dataclass, replace
 

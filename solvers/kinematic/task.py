@@ -1,4 +1,4 @@
-"""What a kinematic controller is asked for: a value, and how fast it should change."""
+"""A task of a kinematic controller: a value, and the velocity that is wanted of it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

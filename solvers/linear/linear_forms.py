@@ -137,14 +137,14 @@ class Sparse(MPCForm):
     def _row_blocks(self, m: Matrices) -> list["_Block"]:
         steps, n = self._after.shape
         on, count = self.lq.on_control, len(self.lq.rows)
-        gap = np.arange(steps * n).reshape(steps, n)
+        defects = np.arange(steps * n).reshape(steps, n)
         first = steps * n + np.arange(int(on.sum()))[None]
         middle = first.size + steps * n + np.arange((steps - 1) * count).reshape(steps - 1, count)
         end = steps * n + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
         return [
-            _Block(gap, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
-            _Block(gap[1:], self._after[:-1], -m.A[1:]),
-            _Block(gap, self._u, -m.B),
+            _Block(defects, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
+            _Block(defects[1:], self._after[:-1], -m.A[1:]),
+            _Block(defects, self._u, -m.B),
             _Block(first, self._u[:1], m.D_u[:1, on]),
             _Block(middle, self._after[:-1], m.D_x[1:]),
             _Block(middle, self._u[1:], m.D_u[1:]),
@@ -159,13 +159,14 @@ class Sparse(MPCForm):
         g[self._u[0]] += 2.0 * (x0 @ m.S[0])
         g[self._after[:-1]] = 2.0 * data.q[1:]
         g[self._after[-1]] = 2.0 * data.p
-        gap = data.c.copy()
-        gap[0] += m.A[0] @ x0
+        defects = data.c.copy()
+        defects[0] += m.A[0] @ x0
         low, high = self._bounds(data)
         known = m.D_x[0, on] @ x0
         low[:first] -= known
         high[:first] -= known
-        return QpVectors(g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high]))
+        rows = defects.ravel()
+        return QpVectors(g, np.concatenate([rows, low]), np.concatenate([rows, high]))
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""

@@ -122,7 +122,7 @@ class LinearMPCProgram(MethodProgram):
     Attributes:
         lq: the problem as arrays.
         form: layout of unknowns and rows.
-        backend: who solves it, with its workspace.
+        backend: solves it, with its workspace.
         softening: which rows are soft.
     """
 
@@ -146,7 +146,7 @@ class LinearMPCProgram(MethodProgram):
             w.soft = QP.of(*self.softening.soften(self.form.H, self.form.G))
 
     def quadratic_program(self, data: RunData) -> QP:
-        """Return the (soft) program of a run, for who wants to solve it elsewhere."""
+        """Return the (soft) program of a run, to solve it elsewhere."""
         return self._programs(data.x0, self.lq.on(data))[1]
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:

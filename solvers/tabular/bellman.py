@@ -190,10 +190,10 @@ def _vertex(
     left: np.ndarray, middle: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the parabola through -1, 0 and 1 is least, and by how much below the middle."""
-    bend, tilt = left - 2.0 * middle + right, (right - left) / 2.0
-    curved = bend > 0.0
-    shift = np.divide(-tilt, bend, out=np.zeros_like(bend), where=curved)
-    return shift, 0.5 * bend * shift**2
+    curvature, slope = left - 2.0 * middle + right, (right - left) / 2.0
+    convex = curvature > 0.0
+    shift = np.divide(-slope, curvature, out=np.zeros_like(curvature), where=convex)
+    return shift, 0.5 * curvature * shift**2
 
 
 def _bounds(constraints: tuple[Constraint, ...]) -> tuple[np.ndarray, np.ndarray]:

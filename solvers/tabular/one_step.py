@@ -1,4 +1,4 @@
-"""The problem of one step: the best input for it, and the constraints of where it leads."""
+"""The problem of one step of greedy control: its best input, within the constraints after it."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple

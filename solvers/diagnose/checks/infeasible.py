@@ -26,13 +26,13 @@ def infeasible(subject: DiagnosedProblem) -> Iterator[Finding]:
         return
     # A coarse grid is quick, but may jump over what a finer one cannot.
     for on in dict.fromkeys((subject.coarse, subject)):
-        found = _stretched(on, subject.trial)
+        found = _with_more_time(on, subject.trial)
         if found is not None:
             yield found
             return
 
 
-def _stretched(subject: DiagnosedProblem, trial: Solution) -> Finding | None:
+def _with_more_time(subject: DiagnosedProblem, trial: Solution) -> Finding | None:
     """Return what is in conflict on this grid; None if everything can be met."""
     elastic, nodes = along(subject)
     tr, p = subject.program.transcription, subject.program.transcription.data_vector(subject.data)

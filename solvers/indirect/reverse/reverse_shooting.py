@@ -58,7 +58,7 @@ class ReverseShooting(Solver):
 
     The manifold is that of the problem's invariants (where there are none, of its terminal
     constraints), which the dynamics must keep. Like all single shooting it converges from near
-    by only, where the distance cost bites: ``enumerate_extremals`` looks everywhere.
+    by only, where the distance cost is active: ``enumerate_extremals`` scans all ends.
 
     Args:
         boundary: type of the boundary conditions.

@@ -93,14 +93,14 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
         y: multipliers (rows,), positive at upper bounds, negative at lower ones. The sign a
             bound that does not exist would have counts as a dual residual.
     """
-    rows, curved, pulled = qp.products.G @ z, qp.products.H @ z, qp.products.Gt @ y
-    primal = max((qp.l - rows).max(initial=0.0), (rows - qp.u).max(initial=0.0))
+    gz, hz, gty = qp.products.G @ z, qp.products.H @ z, qp.products.Gt @ y
+    primal = max((qp.l - gz).max(initial=0.0), (gz - qp.u).max(initial=0.0))
     impossible = np.where(y > 0.0, np.isinf(qp.u), np.isinf(qp.l)) * np.abs(y)
-    dual = max(np.abs(curved + qp.g + pulled).max(initial=0.0), impossible.max(initial=0.0))
+    dual = max(np.abs(hz + qp.g + gty).max(initial=0.0), impossible.max(initial=0.0))
     bound = np.where(y > 0.0, qp.u, qp.l)
     paid = y @ np.where(np.isfinite(bound), bound, 0.0)
-    quadratic, linear = float(z @ curved), float(qp.g @ z)
-    sizes = [np.abs(v).max(initial=0.0) for v in (rows, curved, qp.g, pulled)]
+    quadratic, linear = float(z @ hz), float(qp.g @ z)
+    sizes = [np.abs(v).max(initial=0.0) for v in (gz, hz, qp.g, gty)]
     return Residuals(
         primal / (1.0 + sizes[0]),
         dual / (1.0 + max(sizes[1:])),
