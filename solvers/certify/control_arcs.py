@@ -17,7 +17,7 @@ _SHORTEST, _SHORTEST_FREE = 2e-3, 2e-2
 
 
 class NoArcsError(Exception):
-    """A method on arcs has nothing to say; the message says why."""
+    """A method on arcs does not apply; the message says why."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ _MOST_INTERVALS = 1000
 
 
 class NoEstimateError(Exception):
-    """A method says nothing about this problem; the message says why."""
+    """A method gives no value for this problem; the message says why."""
 
 
 class ExtrapolatedCost(NamedTuple):

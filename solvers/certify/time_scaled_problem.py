@@ -125,7 +125,7 @@ class TimeScaledProblem:
 
     @property
     def _pinned(self) -> ca.SX:
-        """A price that keeps controls that a law decides where they can be: the law does it."""
+        """A cost that fixes the controls that laws replace: nothing else depends on them."""
         ocp, cost = self.start.problem, ca.SX(0.0)
         box = ocp.control_bounds
         for j, symbol in enumerate(ca.vertsplit(ocp.model.u)):

@@ -88,7 +88,7 @@ class DiagnosedProblem:
 
     @cached_property
     def trial(self) -> Solution:
-        """What the direct method makes of it."""
+        """The solution of the direct method."""
         guess = self.given if self.given is not None and self.given.status.is_success else None
         values = self.data.values.as_dict()
         return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)

@@ -10,7 +10,7 @@ from solvers.indirect.indirect_shooting import IndirectShootingProgram
 
 @dataclass(frozen=True)
 class HalvingChange:
-    """The error of the steps, as far as halving them tells.
+    """The error of the steps, estimated by halving them.
 
     Attributes:
         cost: of the optimal cost, to first order.

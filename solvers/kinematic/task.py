@@ -80,7 +80,7 @@ class Task:
 
     @property
     def desired_velocity(self) -> ca.SX:
-        """What J dq/dt has to be (m,): the wanted velocity without that of time alone."""
+        """J dq/dt (m,): the desired velocity without that of time alone."""
         return ca.densify(self.rate - ca.jacobian(self.value, self.t))
 
     @property

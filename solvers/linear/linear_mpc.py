@@ -62,8 +62,8 @@ class LinearMPC(Solver):
         form: ``"sparse"`` keeps the states as unknowns, effort linear in the horizon;
             ``"condensed"`` has inputs only (2.83), pre-stabilised: good for short horizons.
         tolerance: largest accepted residual.
-        soft: price of exceeding a constraint that is not a bound of a control, an exact
-            penalty; it has to exceed the constraints' multipliers. None: hard.
+        soft: weight of an exact penalty on exceeding a constraint that is not a bound of a
+            control; it has to exceed the constraints' multipliers. None: hard.
     """
 
     backend: str = "osqp"
@@ -237,7 +237,7 @@ class LinearMPCProgram(MethodProgram):
         return _Verdict(answer.z[:size], y, Status.ITERATION_LIMIT, said)
 
     def _elastic_rows(self) -> np.ndarray:
-        """Rows that give way in the search for the cause: all but dynamics and control bounds."""
+        """Rows that are relaxed to find the cause: all but dynamics and control bounds."""
         rows = [self.form.equations + i for i, p in enumerate(self.form.places)
                 if not p.is_control_bound]  # fmt: skip
         return np.array(rows, dtype=int)

@@ -101,9 +101,9 @@ class Bellman:
         after, cost = self.step(x, u, common[-1], first=False)
         matrix, inside = self.grid.interpolation(after)
         for k in reversed(range(self.n)):
-            if k < self.n - 1 and (f.moves or f.pays):
+            if k < self.n - 1 and (f.state_varies or f.cost_varies):
                 after, cost = self.step(x, u, common[k], first=False)
-            if k < self.n - 1 and f.moves:
+            if k < self.n - 1 and f.state_varies:
                 matrix, inside = self.grid.interpolation(after)
             cost[~inside] = np.inf
             total = (matrix @ value[k + 1] + cost).reshape(self.grid.size, -1)

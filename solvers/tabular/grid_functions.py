@@ -22,8 +22,8 @@ class GridFunctions:
         terminal_cost: (x; t, p) -> phi.
         on_control: which rows of the path constraints contain a control.
         resting: the other rows: they hold at the last node too.
-        moves: whether the state after a step depends on time or on a signal.
-        pays: whether its cost or a path constraint does.
+        state_varies: whether the state after a step depends on time or on a signal.
+        cost_varies: whether its cost or a path constraint does.
     """
 
     step: Columns
@@ -33,8 +33,8 @@ class GridFunctions:
     terminal_cost: Columns
     on_control: np.ndarray
     resting: tuple[Constraint, ...]
-    moves: bool
-    pays: bool
+    state_varies: bool
+    cost_varies: bool
 
     @classmethod
     def of(cls, ocp: OCP, integrator: Integrator) -> "GridFunctions":
@@ -60,8 +60,8 @@ class GridFunctions:
             terminal_cost=_at_end(ocp, "terminal_cost", [ca.SX(ocp.terminal_cost)]),
             on_control=on_control,
             resting=resting,
-            moves=ca.depends_on(after, timely),
-            pays=ca.depends_on(cost, timely) or on_path,
+            state_varies=ca.depends_on(after, timely),
+            cost_varies=ca.depends_on(cost, timely) or on_path,
         )
 
 

@@ -197,7 +197,7 @@ def _guess(motions: _Motions, start: Manifold, end: np.ndarray, x0: np.ndarray) 
 def _exact(
     program: IndirectShootingProgram, data: RunData, guesses: list[Guess]
 ) -> Iterator[Solution]:
-    """Yield what Newton makes of each guess, with the outcome of the second-order test."""
+    """Yield Newton's solution from each guess, with the outcome of the second-order test."""
     for guess in guesses:
         solution = program.run(
             x0=data.x0, t0=data.t0, parameters=data.values.as_dict(), guess=guess

@@ -163,7 +163,7 @@ class NamedBackend(QpBackend):
 
 
 class _SparseRows:
-    """The rows of a program sorted as qpsolvers wants them: equations, and those below a bound."""
+    """The rows of a program sorted as qpsolvers takes them: equations, and those below a bound."""
 
     def __init__(self, qp: QP, sparse: bool) -> None:
         self._h, self._g = qp.H, qp.G

@@ -111,7 +111,7 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Softening:
-    r"""Rows that may be exceeded at a price.
+    r"""Rows that may be exceeded, with a penalty.
 
     .. math:: l_i - e_i \le G_i z \le u_i + e_i, \quad e_i \ge 0, \quad
               \dots + w (e_i + e_i^2/2)
@@ -121,11 +121,11 @@ class Softening:
 
     Attributes:
         rows: which rows, indices (s,).
-        price: w, positive.
+        penalty: w, positive.
     """
 
     rows: np.ndarray
-    price: float
+    penalty: float
 
     def soften(self, h: sp.csc_matrix, g: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
         """Return the matrices H and G of the program with slacks e behind z."""
@@ -137,7 +137,7 @@ class Softening:
         zero = sp.csc_matrix((count, _shape(g)[1]))
         rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
         return (
-            sp.csc_matrix(sp.block_diag([h, self.price * unit], format="csc")),
+            sp.csc_matrix(sp.block_diag([h, self.penalty * unit], format="csc")),
             sp.csc_matrix(rows),
         )
 
@@ -149,7 +149,7 @@ class Softening:
         hard[self.rows] = -np.inf
         free = np.full(count, np.inf)
         return QpVectors(
-            np.concatenate([g, np.full(count, self.price)]),
+            np.concatenate([g, np.full(count, self.penalty)]),
             np.concatenate([hard, low[self.rows], np.zeros(count)]),
             np.concatenate([high, free, free]),
         )
