@@ -94,7 +94,7 @@ def _summed(runs: list[Solution], verdicts: list[Evaluation], tolerance: float) 
     status, message = last.status, last.message
     if status.is_success and verdict.violation > tolerance:
         status = Status.INFEASIBLE
-        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at any price"
+        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at the largest penalty"
     return last.with_(
         status=status,
         message=message,
