@@ -6,22 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ocp import (
-    OCP,
-    InitialGuess,
-    Solver,
-    Status,
-    Work,
-    linear_quadratic,
-)
-from ocp.internal import (
-    LinearQuadratic,
-    LQData,
-    Matrices,
-    MethodProgram,
-    RunData,
-    RunResult,
-)
+from ocp import OCP, InitialGuess, Solver, Status, Work, linear_quadratic
+from ocp.internal import LinearQuadratic, LQData, Matrices, MethodProgram, RunData, RunResult
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.stacked_prediction import StackedPrediction
 

@@ -1,23 +1,11 @@
 """Constrained linear optimal control: one quadratic program, solved again and again."""
 
 from dataclasses import dataclass, field
-from typing import (
-    ClassVar,
-    Literal,
-    NamedTuple,
-)
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ocp import (
-    OCP,
-    InitialGuess,
-    ProblemError,
-    Solver,
-    Status,
-    Work,
-    linear_quadratic,
-)
+from ocp import OCP, InitialGuess, ProblemError, Solver, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,

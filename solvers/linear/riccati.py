@@ -16,12 +16,7 @@ from ocp import (
     linear_quadratic,
     with_stationary_end,
 )
-from ocp.internal import (
-    LinearQuadratic,
-    MethodProgram,
-    RunData,
-    RunResult,
-)
+from ocp.internal import LinearQuadratic, MethodProgram, RunData, RunResult
 from solvers.linear import regulator_gains as recursion
 
 
