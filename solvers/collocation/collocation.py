@@ -1,15 +1,12 @@
 """Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, InitialGuess, Program, Solution, Solver, UnsupportedProblem
-from ocp.internal import RunData, check_instance, check_positive, elevated
+from ocp import OCP, InitialGuess, Solver, UnsupportedProblem
+from ocp.internal import MethodProgram, RunData, RunResult, check_instance, check_positive, elevated
 from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
 from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
@@ -99,17 +96,16 @@ class Collocation(Solver):
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
             )
         grid = CollocationGrid.of(self.chosen_mesh, self.points)
-        program = CollocationProgram(self, CollocatedProblem(ocp, grid), Defects.of(ocp, grid))
+        program = CollocationProgram(self, ocp, CollocatedProblem(ocp, grid), Defects.of(ocp, grid))
         program.search.nlp  # noqa: B018 - all symbolic work is done here
         return program
 
 
 @dataclass(frozen=True, eq=False)
-class CollocationProgram(Program):
+class CollocationProgram(MethodProgram):
     """A collocated problem with its backend.
 
     Attributes:
-        solver: the options.
         transcription: the problem on its points.
         defects: the dynamics between the nodes.
     """
@@ -118,20 +114,11 @@ class CollocationProgram(Program):
     transcription: CollocatedProblem
     defects: Defects
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
-        started, ocp = perf_counter(), self.transcription.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        first = self._first_iterate(data, ocp.first_guess(guess))
+        first = self._first_iterate(data, guess)
         found = self.search.solve(first.joined(), data)
-        return self._solution(data, found, perf_counter() - started)
+        return self._result(data, found)
 
     @cached_property
     def search(self) -> NlpRun:
@@ -190,16 +177,13 @@ class CollocationProgram(Program):
         x[grid.point_nodes] = parts.x.T  # within the state bounds, at the edges as well
         return x
 
-    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
+    def _result(self, data: RunData, found: NlpOutcome) -> RunResult:
         tr, answer = self.transcription, found.last
-        return Solution(
-            problem=tr.ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=found.status,
             message=found.message,
             t=self.search.times(answer, data),
             x=self._states(answer.w),
-            x0=data.x0,
             costate=costates(tr, answer, data),
             u=self._elevated(tr.split(answer.w).c.T),
             control_kind="polynomial",
@@ -209,6 +193,4 @@ class CollocationProgram(Program):
             iterations=found.iterations,
             work=found.work,
             history=found.history(),
-            parameters=data.values.as_dict(),
-            solve_time=seconds,
         )

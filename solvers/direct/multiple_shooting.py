@@ -1,16 +1,21 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver
-from ocp.internal import RunData, Transcription, check_instance, check_positive, check_whole
+from ocp import OCP, RK4, InitialGuess, Integrator, Solver
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    Transcription,
+    check_instance,
+    check_positive,
+    check_whole,
+)
 from solvers.direct.nlp_backends import NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
@@ -77,17 +82,16 @@ class MultipleShooting(Solver):
         """Transcribe the problem and set the backend up."""
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         intervals = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
-        program = MultipleShootingProgram(self, transcription, intervals)
+        program = MultipleShootingProgram(self, ocp, transcription, intervals)
         program.search.nlp  # noqa: B018 - all symbolic work is done here
         return program
 
 
 @dataclass(frozen=True, eq=False)
-class MultipleShootingProgram(Program):
+class MultipleShootingProgram(MethodProgram):
     """A transcribed problem with its backend.
 
     Attributes:
-        solver: the options.
         transcription: the problem on its grid.
         intervals: for first guesses, and to check the integrator.
     """
@@ -96,21 +100,11 @@ class MultipleShootingProgram(Program):
     transcription: Transcription
     intervals: ShootingGrid
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; where that fails, look for a trajectory that is feasible."""
-        started = perf_counter()
-        ocp = self.transcription.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        z, u = self.first_iterate(data, ocp.first_guess(guess))
+        z, u = self.first_iterate(data, guess)
         found = self.search.solve(self.transcription.join(z, u), data)
-        return self._solution(data, found, perf_counter() - started)
+        return self._result(data, found)
 
     @cached_property
     def search(self) -> NlpRun:
@@ -145,18 +139,15 @@ class MultipleShootingProgram(Program):
         schedule = self.intervals.schedule(data, tr.duration(answer.w))
         return self.intervals.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _solution(self, data: RunData, found: NlpOutcome, seconds: float) -> Solution:
+    def _result(self, data: RunData, found: NlpOutcome) -> RunResult:
         """The last answer, with the work of all."""
         tr, answer = self.transcription, found.last
         z, u = tr.split(answer.w)
-        return Solution(
-            problem=tr.ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=found.status,
             message=found.message,
             t=self.search.times(answer, data),
             x=z[:, : tr.ocp.model.nx],
-            x0=data.x0,
             costate=tr.costates(answer.w, answer.lam_x, answer.lam_g, data),
             u=u,
             cost=answer.cost,
@@ -164,6 +155,4 @@ class MultipleShootingProgram(Program):
             iterations=found.iterations,
             work=found.work,
             history=found.history(),
-            parameters=data.values.as_dict(),
-            solve_time=seconds,
         )

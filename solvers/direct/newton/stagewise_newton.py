@@ -1,25 +1,18 @@
 """Newton's method stage by stage: the quickest way to a minimum within bounds of the controls."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    RK4,
-    InitialGuess,
-    Integrator,
-    Program,
-    Solution,
-    Solver,
-    Status,
-    UnsupportedProblem,
-    Work,
+from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, UnsupportedProblem, Work
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_positive,
+    check_whole,
 )
-from ocp.internal import RunData, check_instance, check_positive, check_whole
 from solvers.direct.newton.globalised_newton import GlobalisedNewton
 from solvers.direct.newton.newton_step import Iterate, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid
@@ -83,7 +76,7 @@ class StagewiseNewton(Solver):
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
         intervals = ShootingGrid.of(ocp, n, self.integrator, fast=fast)
-        return StagewiseNewtonProgram(self, step, intervals)
+        return StagewiseNewtonProgram(self, ocp, step, intervals)
 
 
 def _refuse(ocp: OCP) -> None:
@@ -98,11 +91,10 @@ def _refuse(ocp: OCP) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class StagewiseNewtonProgram(Program):
+class StagewiseNewtonProgram(MethodProgram):
     """A problem with its Newton step.
 
     Attributes:
-        solver: the options.
         step: the Newton step.
         intervals: for first guesses, and to check the integrator.
     """
@@ -111,25 +103,16 @@ class StagewiseNewtonProgram(Program):
     step: NewtonStep
     intervals: ShootingGrid
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data."""
-        started = perf_counter()
-        ocp = self.intervals.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
+        ocp = self.ocp
         schedule = self.intervals.schedule(data, ocp.duration)
         final = data.values.at(1.0)[0]
         solver = self.solver
         descent = GlobalisedNewton(
             self.step, [*schedule, final], solver.tolerance, solver.max_iterations
         )
-        status = descent.descend(self._first_iterate(data, ocp.first_guess(guess)))
+        status = descent.descend(self._first_iterate(data, guess))
         found = descent.view
         x, u = found.at.x.T, found.at.u.T
         message = descent.message
@@ -139,14 +122,11 @@ class StagewiseNewtonProgram(Program):
             if not error <= solver.accuracy:
                 status = Status.INACCURATE
                 message = f"a state moves by {error:.2g} at t = {t[node]:.4g} s"
-        return Solution(
-            problem=ocp,
-            solver=repr(solver),
+        return RunResult(
             status=status,
             message=message,
             t=t,
             x=x,
-            x0=data.x0,
             costate=found.at.costate.T,
             u=u,
             cost=found.cost if np.isfinite(found.cost) else np.inf,
@@ -157,8 +137,6 @@ class StagewiseNewtonProgram(Program):
                 "cost": np.array(descent.costs),
                 "residual": np.array(descent.residuals),
             },
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
     def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> Iterate:
