@@ -24,6 +24,7 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
+from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
@@ -33,9 +34,11 @@ __all__ = [
     "LQData",
     "LinearQuadratic",
     "Matrices",
+    "MethodProgram",
     "ParameterValues",
     "PiecewisePolynomial",
     "RunData",
+    "RunResult",
     "Stage",
     "Transcription",
     "Violation",

@@ -1,4 +1,4 @@
-"""Many starts, the distinct local optima they lead to."""
+"""Solving from many starts: the distinct local optima they lead to."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -49,7 +49,7 @@ def multistart(
         seed: of the random controls; the same seed gives the same starts.
         amplitude: standard deviation of the controls, in their own units (where a control is
             bounded, at most half its range).
-        violation: an answer that violates a constraint by more, in the referee's eyes, does
+        violation: an answer that violates a constraint by more, by the referee's evaluation, does
             not count.
 
     Returns:

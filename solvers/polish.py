@@ -1,4 +1,4 @@
-"""A direct solution made exact: indirect multiple shooting, then the second-order test."""
+"""From a direct solution to an extremal: indirect multiple shooting, second-order test."""
 
 from time import perf_counter
 

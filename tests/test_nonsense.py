@@ -361,7 +361,7 @@ CALLS: list[tuple[str, Wrong]] = [
      lambda: multistart(problem(), ANY(10), 2, 0, **{"violation": "a"})),
     ("self_motions: manifold is an int", lambda: self_motions(*[3], [])),
     ("seeds_around: manifold is an int", lambda: seeds_around(*[3], np.zeros(2))),
-    ("raise until clear: soft is an int",
+    ("penalty continuation: soft is an int",
      lambda: penalty_continuation(*[3], problem(), ANY(), parameter="k")),
     ("mesh: edges is an int", lambda: Mesh(*[3], (3,))),
     ("mesh: edge = 'a'", lambda: Mesh(*[("a", 1.0)], (3,))),

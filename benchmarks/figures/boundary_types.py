@@ -102,7 +102,7 @@ def _bare(*, free_start: bool) -> OCP:
 
 @cache
 def _found(*, free: bool) -> Enumeration:
-    return enumerate_extremals(_bare(free_start=free), gap=0.1)
+    return enumerate_extremals(_bare(free_start=free), spacing=0.1)
 
 
 def _number(found: Enumeration) -> str:

@@ -15,8 +15,8 @@ _COARSE = 68
 def with_obstacle() -> Drawing:
     """Draw cost, transversality and distance from the start over the end configuration."""
     scenario = arm_scenario(_SCENARIO)
-    free = enumerate_extremals(scenario.ocp("sum", free_start=True), gap=0.2)
-    given = enumerate_extremals(scenario.ocp("sum"), gap=0.2)
+    free = enumerate_extremals(scenario.ocp("sum", free_start=True), spacing=0.2)
+    given = enumerate_extremals(scenario.ocp("sum"), spacing=0.2)
     (scan,) = free.scans
     periods = scan.curve.manifold.periods
     away = np.linalg.norm(periods.wrapped(scan.starts - np.array(scenario.theta0)), axis=1)

@@ -66,7 +66,7 @@ class Solution:
             costate.
         breaks: which nodes the pieces of a polynomial control meet at, (K + 1,), from 0 to N;
             empty for the other kinds.
-        cost: what the solver believes; only ``evaluate`` says what it is.
+        cost: as the solver computes it; ``evaluate`` integrates it independently.
         residual: the solver's own measure of optimality (its unit is the solver's).
         iterations: iterations of the outer method.
         work: integrations, Jacobians and factorisations.
@@ -141,7 +141,7 @@ class Solution:
         return max(1, len(self.u) // pieces) * pieces
 
     def __repr__(self) -> str:
-        """Return one line: what was solved, how it ended, what the solver believes it costs."""
+        """Return one line: what was solved, how it ended, the cost as the solver computes it."""
         return (
             f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
             f"{self.iterations} iterations, {len(self.t) - 1} intervals{self._hint}>"
@@ -149,7 +149,7 @@ class Solution:
 
     @property
     def _hint(self) -> str:
-        """Who knows more about a failure."""
+        """Where to read more about a failure."""
         return "" if self.status.is_success else "; solvers.diagnose(solution) looks for the cause"
 
     @property
@@ -252,7 +252,7 @@ class Solution:
         cube = (slope + slope_end - 2 * secant) / steps**2
         return PPoly(np.stack([cube, square, slope, z[:-1]]), self.t)
 
-    # -- to look at, to keep --------------------------------------------------------
+    # -- pictures and files --------------------------------------------------------
 
     def plot(self) -> "Figure":
         """Return a figure of states, controls, costates and constraints over time."""

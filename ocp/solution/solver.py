@@ -1,4 +1,4 @@
-"""What every solver promises: build once, run often."""
+"""The interface of every solver: build once, run often."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping

@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class Status(Enum):
-    """The outcome of a solve; only the first two stand behind the trajectory."""
+    """The outcome of a solve; only the first two are successes."""
 
     #: Success. A direct method has checked curvature where its iterates went, no further; a
     #: polished extremal has passed the second-order test of the problem itself.
@@ -26,7 +26,7 @@ class Status(Enum):
     ITERATION_LIMIT = "not converged within the iteration limit: raise it or start closer"
     #: Stopped before the tolerance was met, with the iterate it had.
     TIME_LIMIT = "not converged within the time limit: raise it or start closer"
-    #: A line search or a damped Newton step came to nothing.
+    #: No step of a line search or of a damped Newton method was accepted.
     NO_PROGRESS = "no step improves the iterate: start closer, use continuation or a direct method"
     #: A number that is not finite, or iterates without bound.
     DIVERGED = "the iterates blew up: start closer, or use continuation or more segments"

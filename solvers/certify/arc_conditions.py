@@ -8,7 +8,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from ocp import Signal, Solution
+from ocp import OCP, Signal, Solution
 from ocp.internal import hamiltonian
 from solvers.certify.control_arcs import Arc, NoArcsError
 
@@ -34,89 +34,43 @@ class ArcConditions:
     Attributes:
         start: the problem and its data.
         arcs: in order.
-
-    Raises:
-        NoArcsError: for what these equations do not say.
+        controls: u_i(x, λ, t) of each arc.
+        junctions: H_u of the control that changes its law, from arc to arc, of (z, t).
     """
 
     start: Solution
     arcs: tuple[Arc, ...]
+    controls: list[ca.SX]
+    junctions: list[ca.Function]
 
-    def __post_init__(self) -> None:
-        """Refuse what the equations do not say."""
-        ocp = self.start.problem
+    @classmethod
+    def of(cls, start: Solution, arcs: tuple[Arc, ...]) -> "ArcConditions":
+        """Derive the conditions.
+
+        Raises:
+            NoArcsError: for what these equations do not cover.
+        """
+        ocp = start.problem
         if any(isinstance(entry, Signal) for entry in ocp.parameters):
             raise NoArcsError("signals are not looked at")
         if ocp.has_free_start:
             raise NoArcsError("the start is free")
         if not all(c.is_equation for c in ocp.at("terminal")):
             raise NoArcsError("an inequality at the end")
-        self.controls  # noqa: B018 - refuses its own
-        self.junctions  # noqa: B018 - refuses its own
-
-    @cached_property
-    def _numbers(self) -> np.ndarray:
-        return self.start.data.values.at(0.0)[0]
+        controls = [_control(ocp, arc) for arc in arcs]
+        return cls(start, arcs, controls, _junctions(start, arcs, controls))
 
     @property
-    def _z(self) -> ca.SX:
-        """State and costate."""
-        return ca.vertcat(self.start.problem.model.x, self._costate)
-
-    @cached_property
     def _costate(self) -> ca.SX:
         return hamiltonian(self.start.problem).expressions.costate
 
-    @cached_property
+    @property
     def _hamiltonian(self) -> ca.SX:
-        ocp = self.start.problem
-        return ocp.running_cost + ca.dot(self._costate, ocp.model.f)
-
-    @cached_property
-    def controls(self) -> list[ca.SX]:
-        """u_i(x, λ, t) of each arc."""
-        return [self._control(arc) for arc in self.arcs]
-
-    def _control(self, arc: Arc) -> ca.SX:
-        m = self.start.problem.model
-        symbols, u = ca.vertsplit(m.u), m.u
-        for symbol, law in zip(symbols, arc.laws, strict=True):
-            u = ca.substitute(u, symbol, law.value) if law else u
-        free = [s for s, law in zip(symbols, arc.laws, strict=True) if law is None]
-        if not free:
-            return u
-        chosen = ca.vertcat(*free)
-        slope = ca.gradient(ca.substitute(self._hamiltonian, m.u, u), chosen)
-        curvature = ca.jacobian(slope, chosen)
-        if ca.depends_on(curvature, chosen) or ca.sprank(curvature) < len(free):
-            names = ", ".join(str(s) for s in free)
-            raise NoArcsError(f"H is not quadratic in {names} where no bound is met")
-        best = -ca.solve(curvature, ca.substitute(slope, chosen, ca.SX.zeros(len(free))))
-        return ca.substitute(u, chosen, best)
-
-    @cached_property
-    def junctions(self) -> list[ca.Function]:
-        """H_u of the control that changes its law, from arc to arc, of (z, t)."""
-        m, found = self.start.problem.model, []
-        slope = ca.gradient(self._hamiltonian, m.u)
-        for k, (one, other) in enumerate(pairwise(self.arcs)):
-            pairs = zip(one.names, other.names, strict=True)
-            changed = [j for j, (a, b) in enumerate(pairs) if a != b]
-            if len(changed) != 1:
-                raise NoArcsError("two controls switch at once")
-            (j,) = changed
-            laws = one.laws[j], other.laws[j]
-            if all(laws) and any(law.row is not None for law in laws if law):
-                raise NoArcsError("a control goes from a bound right to a path constraint")
-            bound = self.controls[k if laws[0] else k + 1]
-            found.append(self.function([ca.substitute(slope[j], m.u, bound)]))
-        return found
+        return _hamiltonian(self.start.problem)
 
     def function(self, expressions: Sequence[ca.SX]) -> ca.Function:
         """Expressions as a Function of (z, t), z state and costate."""
-        ocp = self.start.problem
-        values = ca.substitute(list(expressions), [ocp.p], [ca.SX(self._numbers)])
-        return ca.Function("at", [self._z, ocp.model.t], values)
+        return _function(self.start, expressions)
 
     @cached_property
     def rates(self) -> list[ca.Function]:
@@ -135,7 +89,7 @@ class ArcConditions:
         ]
 
     @cached_property
-    def pulls(self) -> list[ca.Function]:
+    def law_multipliers(self) -> list[ca.Function]:
         """On each arc: H_u against the laws, not positive where multipliers have their signs."""
         m, found = self.start.problem.model, []
         slopes = ca.vertsplit(ca.gradient(self._hamiltonian, m.u))
@@ -170,5 +124,59 @@ class ArcConditions:
         else:
             last = ca.sum1(lengths) - ocp.duration
         rows = ca.vertcat(psi, self._costate - ca.gradient(end, m.x), last)
-        rows = ca.substitute(rows, ocp.p, ca.SX(self._numbers))
-        return ca.Function("end", [self._z, m.t, nu, lengths], [rows])
+        rows = ca.substitute(rows, ocp.p, ca.SX(self.start.data.values.at(0.0)[0]))
+        return ca.Function("end", [_z(ocp), m.t, nu, lengths], [rows])
+
+
+def _hamiltonian(ocp: OCP) -> ca.SX:
+    return ocp.running_cost + ca.dot(hamiltonian(ocp).expressions.costate, ocp.model.f)
+
+
+def _z(ocp: OCP) -> ca.SX:
+    """State and costate."""
+    return ca.vertcat(ocp.model.x, hamiltonian(ocp).expressions.costate)
+
+
+def _function(start: Solution, expressions: Sequence[ca.SX]) -> ca.Function:
+    """Expressions as a Function of (z, t), with the parameters of a run."""
+    ocp = start.problem
+    p = ca.SX(start.data.values.at(0.0)[0])
+    values = ca.substitute(list(expressions), [ocp.p], [p])
+    return ca.Function("at", [_z(ocp), ocp.model.t], values)
+
+
+def _control(ocp: OCP, arc: Arc) -> ca.SX:
+    """u_i(x, λ, t) of an arc."""
+    m = ocp.model
+    symbols, u = ca.vertsplit(m.u), m.u
+    for symbol, law in zip(symbols, arc.laws, strict=True):
+        u = ca.substitute(u, symbol, law.value) if law else u
+    free = [s for s, law in zip(symbols, arc.laws, strict=True) if law is None]
+    if not free:
+        return u
+    chosen = ca.vertcat(*free)
+    slope = ca.gradient(ca.substitute(_hamiltonian(ocp), m.u, u), chosen)
+    curvature = ca.jacobian(slope, chosen)
+    if ca.depends_on(curvature, chosen) or ca.sprank(curvature) < len(free):
+        names = ", ".join(str(s) for s in free)
+        raise NoArcsError(f"H is not quadratic in {names} where no bound is met")
+    best = -ca.solve(curvature, ca.substitute(slope, chosen, ca.SX.zeros(len(free))))
+    return ca.substitute(u, chosen, best)
+
+
+def _junctions(start: Solution, arcs: tuple[Arc, ...], controls: list[ca.SX]) -> list[ca.Function]:
+    """H_u of the control that changes its law, from arc to arc, of (z, t)."""
+    m, found = start.problem.model, []
+    slope = ca.gradient(_hamiltonian(start.problem), m.u)
+    for k, (one, other) in enumerate(pairwise(arcs)):
+        pairs = zip(one.names, other.names, strict=True)
+        changed = [j for j, (a, b) in enumerate(pairs) if a != b]
+        if len(changed) != 1:
+            raise NoArcsError("two controls switch at once")
+        (j,) = changed
+        laws = one.laws[j], other.laws[j]
+        if all(laws) and any(law.row is not None for law in laws if law):
+            raise NoArcsError("a control goes from a bound right to a path constraint")
+        bound = controls[k if laws[0] else k + 1]
+        found.append(_function(start, [ca.substitute(slope[j], m.u, bound)]))
+    return found

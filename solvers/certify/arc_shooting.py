@@ -64,7 +64,9 @@ class ArcShooting:
         """Return what the unknowns say, with a polynomial of degree two over every two steps."""
         ocp = self.start.problem
         m, laws = ocp.model, [self.conditions.function([u]) for u in self.conditions.controls]
-        z, lengths, _ = self._split(w)
+        size, total = 2 * m.nx, self.count * self.nodes
+        z = w[: size * total].reshape(total, size).T
+        lengths = w[size * total : size * total + self.count]
         h = np.repeat(lengths / (self.nodes * self.steps), self.nodes)
         begins = self.start.data.t0 + np.append(0.0, np.cumsum(h * self.steps))
         rows, controls, part = [], [], z
@@ -93,21 +95,15 @@ class ArcShooting:
         )
 
     def wrong_signs(self, trajectory: Solution) -> float:
-        """By how much H_u pulls a control off a law that holds it, relative to 1 + abs(H_u)."""
+        """Return the largest law multiplier of a wrong sign, relative to 1 + the largest of all."""
         worst, largest, pieces = 0.0, 0.0, self.nodes * self.steps
-        for i, values in enumerate(self.conditions.pulls):
+        for i, values in enumerate(self.conditions.law_multipliers):
             at = slice(i * pieces, (i + 1) * pieces + 1)
             z = np.hstack([trajectory.x[at], trajectory.costate[at]]).T
-            pulled = np.array(values.map(z.shape[1])(z, trajectory.t[at][None]))
-            worst = max(worst, float(pulled.max(initial=0.0)))
-            largest = max(largest, float(np.abs(pulled).max(initial=0.0)))
+            values_along = np.array(values.map(z.shape[1])(z, trajectory.t[at][None]))
+            worst = max(worst, float(values_along.max(initial=0.0)))
+            largest = max(largest, float(np.abs(values_along).max(initial=0.0)))
         return worst / (1.0 + largest)
-
-    def _split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nodes (2 nx, total), durations, ν."""
-        size, count = 2 * self.start.problem.model.nx, self.count
-        total = size * count * self.nodes
-        return w[:total].reshape(-1, size).T, w[total : total + count], w[total + count :]
 
     # -- the equations ----------------------------------------------------------------
 
@@ -144,8 +140,8 @@ class ArcShooting:
         z[0, : ocp.model.nx] = start.data.x0
         last = np.concatenate([start.x[-1], start.costate[-2]])
         by_cost, by_end = (np.array(v) for v in self.conditions.ends.call([last, start.t[-1]]))
-        gap = start.costate[-2] - by_cost.ravel()
-        nu = np.linalg.lstsq(by_end.T, gap, rcond=None)[0] if by_end.size else np.empty(0)
+        defect = start.costate[-2] - by_cost.ravel()
+        nu = np.linalg.lstsq(by_end.T, defect, rcond=None)[0] if by_end.size else np.empty(0)
         return np.concatenate([z.ravel(), start.duration * np.diff(edges), nu])
 
     def solve(self, guess: np.ndarray, tolerance: float) -> NewtonResult:

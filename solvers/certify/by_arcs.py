@@ -1,4 +1,4 @@
-"""What the arcs of a trajectory make of the optimal value: switches are met exactly."""
+"""The optimal value by shooting over the arcs of a trajectory, with its switches as unknowns."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def by_arcs(answer: Solution) -> Estimate:
 
 def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Newton on the minimum principle, steps halved until the referee's cost holds still."""
-    shooting = ArcShooting(ArcConditions(answer, arcs), steps=_STEPS)
+    shooting = ArcShooting(ArcConditions.of(answer, arcs), steps=_STEPS)
     w, before, change = shooting.guess(), np.inf, np.inf
     while True:
         found = shooting.solve(w, _RESIDUAL)
@@ -90,23 +90,23 @@ def _indirect(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
 
 def _direct(answer: Solution, arcs: tuple[Arc, ...]) -> Estimate:
     """Durations and held controls by multiple shooting, on grids doubled on every arc."""
-    stretched, verdicts = TimeScaledProblem(answer, arcs), []
-    ocp, found = stretched.ocp, None
+    scaled, verdicts = TimeScaledProblem(answer, arcs), []
+    ocp, found = scaled.ocp, None
     for intervals in _INTERVALS:
         program = MultipleShooting(intervals * len(arcs), tolerance=BARRIER).build(ocp)
-        found = program.run(parameters=answer.parameters, guess=found or stretched.guess)
+        found = program.run(parameters=answer.parameters, guess=found or scaled.guess)
         if not found.status.is_success:
             raise NoArcsError(f"{found.status.value}. {found.message}")
         verdicts.append(evaluate(found, tolerance=TOLERANCE))
     assert found is not None
     if not verdicts[-1].violation <= _VIOLATION:
         raise NoArcsError(f"{verdicts[-1].worst} is violated by {verdicts[-1].violation:.1e}")
-    cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
+    limit = extrapolated(np.array([v.cost for v in verdicts]))
     return Estimate(
         method=f"direct multiple shooting on {len(arcs)} arcs, {len(found.t) - 1} intervals",
-        cost=cost,
-        error=max(error, BARRIER * len(found.t), verdicts[-1].cost_error),
+        cost=limit.cost,
+        error=max(limit.error, BARRIER * len(found.t), verdicts[-1].cost_error),
         violation=verdicts[-1].violation,
-        solution=stretched.trajectory(found),
-        sentence=said,
+        solution=scaled.trajectory(found),
+        sentence=limit.sentence,
     )

@@ -14,7 +14,7 @@ _MOST_DIGITS = 16.0
 
 
 class Verdict(Enum):
-    """What came of one check."""
+    """The outcome of one check."""
 
     HOLDS = "holds"
     FAILS = "FAILS"
@@ -59,7 +59,7 @@ class Check:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What one method makes of the optimal value.
+    """The optimal value by one method.
 
     Attributes:
         method: its name, with its settings.

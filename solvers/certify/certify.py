@@ -80,18 +80,18 @@ class CertifyOptions:
 
 @dataclass(frozen=True)
 class _Clock:
-    """When to begin nothing any more."""
+    """The time limit."""
 
     seconds: float
     begun: float
 
     @property
     def is_late(self) -> bool:
-        """Whether the time is over."""
+        """Whether the time limit is reached."""
         return perf_counter() - self.begun > self.seconds
 
     def checks(self, names: Sequence[str], make: Callable[[], Sequence[Check]]) -> list[Check]:
-        """Make some checks, or say that there was no time for them."""
+        """Make some checks, or return that there was no time for them."""
         return [self.left_out(name) for name in names] if self.is_late else list(make())
 
     def left_out(self, name: str) -> Check:
@@ -195,7 +195,7 @@ def _piecewise(found: list[Estimate]) -> Solution:
 
 
 def _global(best: Estimate, effort: CertifyOptions, intervals: int, clock: _Clock) -> list[Check]:
-    """What can be said of the optimum being the global one."""
+    """Return the evidence that the optimum is the global one."""
     reason = other_data(best.solution)
     if reason:
         return [Check.skipped(name, reason) for name in (CONVEXITY, STARTS, EXTREMALS)]
@@ -243,7 +243,7 @@ def _hamiltonian(best: Estimate, unique: bool) -> Check:
 
 
 def _second_order(best: Estimate) -> Check:
-    """The word of ``polish``: no conjugate point."""
+    """The second-order test of ``polish``: no conjugate point."""
     if not best.is_extremal:
         return Check.skipped(SECOND_ORDER, "no extremal to test: see the curvature on the grid")
     if best.solution.status is Status.SOLVED:

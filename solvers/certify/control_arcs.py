@@ -1,4 +1,4 @@
-"""Of which arcs a trajectory is made: which control follows which law, and until when."""
+"""The arcs of a trajectory: which control follows which law, and until when."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _SHORTEST, _SHORTEST_FREE = 2e-3, 2e-2
 
 
 class NoArcsError(Exception):
-    """A method on arcs has nothing to say; the message says why."""
+    """A method on arcs does not apply; the message says why."""
 
 
 @dataclass(frozen=True)

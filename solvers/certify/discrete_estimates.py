@@ -1,4 +1,4 @@
-"""What independent methods make of the optimal value of a discrete-time problem."""
+"""The optimal value of a discrete-time problem by independent methods."""
 
 from ocp import Solution, Solver, UnsupportedProblem, evaluate
 from solvers.certify.certificate import Estimate

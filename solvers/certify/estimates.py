@@ -1,7 +1,8 @@
-"""What independent methods make of an optimal value, each with an error estimate of its own."""
+"""The optimal value by independent methods, each with its own error estimate."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,13 +35,21 @@ _INTERVALS = 9
 BARRIER, _DEFECT, _ROUNDS = 1e-10, 1e-9, 10
 # A cost that changes by less from mesh to mesh, relative, is at its limit.
 _SETTLED = 1e-11
-# Refinement that ends above its accuracy leaves the rest to the cuts where the control bends.
+# Refinement that ends above its accuracy leaves the rest to ``local_error``.
 _LEFT = 1e-6
 _MOST_INTERVALS = 1000
 
 
 class NoEstimateError(Exception):
-    """A method says nothing about this problem; the message says why."""
+    """A method gives no value for this problem; the message says why."""
+
+
+class ExtrapolatedCost(NamedTuple):
+    """The limit of costs on finer and finer grids, its error, and how it was found."""
+
+    cost: float
+    error: float
+    sentence: str
 
 
 def by_polish(solution: Solution) -> Estimate:
@@ -139,15 +148,15 @@ def by_shooting(coarse: Solution) -> Estimate:
     ):
         answer = _solved(MultipleShooting(2 * (len(answer.t) - 1)), answer)
         verdicts.append(evaluate(answer, tolerance=TOLERANCE))
-    cost, error, said = extrapolated(np.array([v.cost for v in verdicts]))
+    limit = extrapolated(np.array([v.cost for v in verdicts]))
     barrier = MultipleShooting().tolerance if _has_inequalities(coarse.problem) else 0.0
     return Estimate(
         method=f"direct multiple shooting, {len(answer.t) - 1} intervals",
-        cost=cost,
-        error=max(error, barrier * len(answer.t), verdicts[-1].cost_error),
+        cost=limit.cost,
+        error=max(limit.error, barrier * len(answer.t), verdicts[-1].cost_error),
         violation=verdicts[-1].violation,
         solution=answer,
-        sentence=said,
+        sentence=limit.sentence,
     )
 
 
@@ -166,7 +175,7 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
                 raise
 
 
-def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
+def extrapolated(costs: np.ndarray) -> ExtrapolatedCost:
     """Return the limit of costs on grids doubled each time, its error, and how it was found.
 
     Richardson's extrapolation assumes one power of the step. Where the last two ratios of
@@ -182,15 +191,18 @@ def extrapolated(costs: np.ndarray) -> tuple[float, float, str]:
     steps, last = np.diff(costs), float(costs[-1])
     if not is_steady(costs):
         change = float(np.abs(steps[-_ERRATIC:]).max())
-        return last, change, "the largest change of the last three doublings; no steady order"
+        return ExtrapolatedCost(
+            last, change, "the largest change of the last three doublings; no steady order"
+        )
     ratios = steps[:-1] / steps[1:]
     limits = costs[2:] + steps[1:] / (ratios - 1.0)
     limit, orders = float(limits[-1]), np.log2(ratios)
     error, said = abs(float(limits[-1] - limits[-2])), f"the observed order {orders[-1]:.2f}"
     if any((np.abs(orders[-2:] - order) <= _CLOSE).all() for order in _SMOOTH_ORDERS):
-        return limit, error, f"extrapolated with {said}"
+        return ExtrapolatedCost(limit, error, f"extrapolated with {said}")
     error = max(error, abs(limit - last), float(np.abs(steps[-_DOUBTFUL:]).max()))
-    return limit, error, f"extrapolated with {said}, which is no power: all of it is in doubt"
+    said = f"extrapolated with {said}, which is no power: all of it is in doubt"
+    return ExtrapolatedCost(limit, error, said)
 
 
 def is_steady(costs: Sequence[float] | np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""Is the local optimum the global one? A proof where the problem is convex, else evidence."""
+"""Whether a local optimum is the global one: a proof where the problem is convex, else evidence."""
 
 from dataclasses import replace
 

@@ -186,7 +186,7 @@ def _stationarity(point: _Point) -> Check:
         f"{wrong.max(initial=0.0) / scale:.1e} among {one_sided} inequalities"
     )
     if wrong.max(initial=0.0) / scale > _RESIDUAL:
-        said += f"; {point.names[int(wrong.argmax())]} pulls the wrong way"
+        said += f"; {point.names[int(wrong.argmax())]} has a multiplier of the wrong sign"
     return Check.at_most(STATIONARITY, worst, _RESIDUAL, said)
 
 

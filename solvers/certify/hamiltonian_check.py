@@ -55,7 +55,7 @@ def _why_not(ocp: OCP) -> str:
 
 
 def _ends_at_zero(solution: Solution) -> bool:
-    """Whether nothing but the Hamiltonian prices the final time."""
+    """Whether H vanishes at the end: a free final time without cost or constraint of its own."""
     ocp = solution.problem
     if not isinstance(ocp.horizon, FreeTime) or _ends_depend_on_time(ocp):
         return False

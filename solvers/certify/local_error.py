@@ -23,7 +23,7 @@ _SHORTEST = 1e-8
 def local_error(
     start: Solution, mesh: Mesh, rounds: int, solver: Collocation
 ) -> Iterator[Solution]:
-    """Yield answers on meshes that are cut where the control bends most.
+    """Yield answers on meshes that are cut where the control is least smooth.
 
     A switch or a junction with an active constraint inside an interval spoils the order of
     collocation there, and leaves no error in the dynamics that would show it. Cutting such

@@ -1,4 +1,4 @@
-"""A problem on arcs: how long each takes is an unknown, what its laws decide is decided."""
+"""A problem on arcs whose durations are unknowns, with the controls that the arcs' laws decide."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ class TimeScaledProblem:
 
     @cached_property
     def ocp(self) -> OCP:
-        """The stretched problem; its states are x, the time, and the durations."""
+        """The scaled problem; its states are x, the time, and the durations."""
         ocp, count = self.start.problem, len(self.arcs)
         m, pace, duration = ocp.model, ca.dot(self._now, self._durations), ocp.horizon
         u = self._control
@@ -81,7 +81,7 @@ class TimeScaledProblem:
         return OCP(
             name=f"{ocp.name}, on {count} arcs",
             model=Model(
-                name=f"{m.name}, stretched",
+                name=f"{m.name}, time scaled",
                 x=states,
                 u=m.u,
                 f=ca.vertcat(pace * rate, pace, ca.SX.zeros(count)),
@@ -125,7 +125,7 @@ class TimeScaledProblem:
 
     @property
     def _pinned(self) -> ca.SX:
-        """A price that keeps controls that a law decides where they can be: the law does it."""
+        """A cost that fixes the controls that laws replace: nothing else depends on them."""
         ocp, cost = self.start.problem, ca.SX(0.0)
         box = ocp.control_bounds
         for j, symbol in enumerate(ca.vertsplit(ocp.model.u)):
@@ -153,7 +153,7 @@ class TimeScaledProblem:
         return found
 
     def trajectory(self, answer: Solution) -> Solution:
-        """Return an answer to the stretched problem, controls held, as one to the original.
+        """Return an answer to the scaled problem, controls held, as one to the original.
 
         Time and start are among its states, which a solver meets to rounding: here they are exact.
         """

@@ -1,15 +1,20 @@
 """Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, InitialGuess, Program, Solution, Solver, UnsupportedProblem
-from ocp.internal import RunData, check_instance, check_positive, check_whole, elevated
+from ocp import OCP, InitialGuess, Solver, UnsupportedProblem
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_positive,
+    check_whole,
+    elevated,
+)
 from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
 from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
@@ -102,39 +107,29 @@ class Collocation(Solver):
         grid = CollocationGrid.of(self.chosen_mesh, self.points)
         transcription = CollocatedProblem(ocp, grid)
         nlp = self.nlp_backend.build(transcription)
-        return CollocationProgram(self, transcription, Defects.of(ocp, grid), nlp)
+        return CollocationProgram(self, ocp, transcription, Defects.of(ocp, grid), nlp)
 
 
 @dataclass(frozen=True, eq=False)
-class CollocationProgram(Program):
+class CollocationProgram(MethodProgram):
     """A collocated problem with its backend.
 
     Attributes:
-        solver: the options.
         transcription: the problem on its points.
-        gaps: the dynamics between the nodes.
+        defects: the dynamics between the nodes.
         nlp: the backend, set up.
     """
 
     solver: Collocation
     transcription: CollocatedProblem
-    gaps: Defects
+    defects: Defects
     nlp: Nlp
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        started, ocp = perf_counter(), self.transcription.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        first = self._first_iterate(data, ocp.first_guess(guess))
+        first = self._first_iterate(data, guess)
         outcome = self._nlp_run.solve(first.joined(), data)
-        return self._solution(data, outcome, perf_counter() - started)
+        return self._result(data, outcome)
 
     @cached_property
     def _nlp_run(self) -> NlpRun:
@@ -153,7 +148,7 @@ class CollocationProgram(Program):
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
         if x is None:
-            x = self.gaps.rollout(self._elevated(c), duration, data)
+            x = self.defects.rollout(self._elevated(c), duration, data)
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (len(grid.nodes), 1))
         z = x[grid.edge_nodes].T
@@ -180,7 +175,7 @@ class CollocationProgram(Program):
         """By how much the integrated dynamics miss a node, relative to 1 + abs(x), and which."""
         w, tr = result.w, self.transcription
         u = self._elevated(tr.split(w).c.T)
-        moved, _ = self.gaps.missed(self._states(w), u, tr.duration(w), data)
+        moved, _ = self.defects.relative(self._states(w), u, tr.duration(w), data)
         worst = int(moved.argmax())
         return float(moved[worst]), worst + 1
 
@@ -193,17 +188,14 @@ class CollocationProgram(Program):
         x[grid.point_nodes] = parts.x.T  # within the state bounds, at the edges as well
         return x
 
-    def _solution(self, data: RunData, outcome: NlpOutcome, seconds: float) -> Solution:
+    def _result(self, data: RunData, outcome: NlpOutcome) -> RunResult:
         """The last result, with the work of all runs."""
         tr, result = self.transcription, outcome.last
-        return Solution(
-            problem=tr.ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=outcome.status,
             message=outcome.message,
             t=self._nlp_run.times(result, data),
             x=self._states(result.w),
-            x0=data.x0,
             costate=costates(tr, result, data),
             u=self._elevated(tr.split(result.w).c.T),
             control_kind="polynomial",
@@ -213,6 +205,4 @@ class CollocationProgram(Program):
             iterations=outcome.iterations,
             work=outcome.work,
             history=outcome.history(),
-            parameters=data.values.as_dict(),
-            solve_time=seconds,
         )

@@ -1,4 +1,4 @@
-"""Steps from node to node of a collocation grid: for first guesses, and to see what is missed."""
+"""Defects of a collocated trajectory between its nodes; roll-outs for first guesses."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from ocp import OCP, RK4, Solution
 from ocp.internal import BufferedFunction, PiecewisePolynomial, RunData, Stage
 from solvers.collocation.mesh import CollocationGrid
 
-# Steps of RK4 from node to node, to see how far the polynomials are from the dynamics.
+# Steps of RK4 from node to node, for the defects.
 _STEPS = 8
 
 
@@ -31,19 +31,19 @@ class Defects:
     @classmethod
     def of(cls, ocp: OCP, grid: CollocationGrid) -> "Defects":
         """Build the functions."""
-        step, gaps = Stage.of(ocp, RK4(), held=False, curved=True).step, len(grid.nodes) - 1
-        fine = step.mapaccum(_STEPS).map(gaps)
-        return cls(ocp, grid, BufferedFunction(fine), BufferedFunction(step.mapaccum(gaps)))
+        step, count = Stage.of(ocp, RK4(), held=False, curved=True).step, len(grid.nodes) - 1
+        fine = step.mapaccum(_STEPS).map(count)
+        return cls(ocp, grid, BufferedFunction(fine), BufferedFunction(step.mapaccum(count)))
 
     def rollout(self, u: np.ndarray, duration: float, data: RunData) -> np.ndarray:
         """Return the states at the nodes under controls of coefficients (K m, nu), (N + 1, nx)."""
         x, _ = self.chain(data.x0, *self._schedule(u, duration, data, self.grid.nodes))
         return np.vstack([data.x0, x.T])
 
-    def missed(
+    def relative(
         self, x: np.ndarray, u: np.ndarray, duration: float, data: RunData
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return by how much each node is missed from the one before, and the cost up to it.
+        """Return the defect at each node of the integration from the one before, and its cost.
 
         Args:
             x: states at the nodes, (N + 1, nx).
@@ -52,8 +52,8 @@ class Defects:
             data: of the run.
 
         Returns:
-            the worst state of each gap, relative to 1 + its largest abs(x) along the trajectory,
-            (N,), and the running cost of the gap, (N,).
+            the largest defect between two nodes, relative to 1 + the state's largest abs(x)
+            along the trajectory, (N,), and the running cost between them, (N,).
         """
         nodes, inside = self.grid.nodes, np.arange(_STEPS) / _STEPS
         fine = (nodes[:-1, None] + inside * np.diff(nodes)[:, None]).ravel()
@@ -66,12 +66,12 @@ class Defects:
     def errors(self, solution: Solution) -> np.ndarray:
         """Return the error of each interval of a solution on this grid, (K,).
 
-        The worst state that is missed in it, or by how much the running cost misses the
+        Its largest relative defect, or the difference of the running cost from the
         quadrature of the interval, relative to 1 + abs(cost).
         """
         begins = self.grid.edge_nodes[:-1]
         given = (solution.x, solution.u, solution.duration, solution.data)
-        moved, costs = self.missed(*given)
+        moved, costs = self.relative(*given)
         of_cost = np.add.reduceat(costs, begins) - self._quadrature(*given)
         return np.maximum(
             np.maximum.reduceat(moved, begins), np.abs(of_cost) / (1.0 + abs(solution.cost))

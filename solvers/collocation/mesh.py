@@ -1,4 +1,4 @@
-"""Where the pieces of a collocated trajectory meet, and of which degree each is."""
+"""The mesh of a collocated trajectory: the edges of its intervals, and their degrees."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -106,7 +106,7 @@ def refine_mesh(
         made += perf_counter() - begun
         data = start.data
         solution = program.run(x0=data.x0, t0=data.t0, parameters=start.parameters, guess=solution)
-        errors = program.gaps.errors(solution)
+        errors = program.defects.errors(solution)
         done.append(MeshRound(cells.mesh, errors, solution.cost, solution.status))
         work, iterations = work + solution.work, iterations + solution.iterations
         solve_time += solution.solve_time

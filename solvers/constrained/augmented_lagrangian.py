@@ -1,20 +1,24 @@
-"""The augmented Lagrangian: constraints for solvers that know none, held between the nodes."""
+"""The augmented Lagrangian: constraints for solvers that take none, met between the nodes too."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
 from ocp.internal import RunData, check_instance, check_positive, check_whole
-from solvers.constrained.multiplier_iteration import MultiplierIteration
+from solvers.constrained.multiplier_iteration import MultiplierIteration, MultiplierResult
+from solvers.constrained.multiplier_round import RelaxedProgram
+from solvers.constrained.multiplier_rule import MultiplierRule
+from solvers.constrained.multiplier_verdict import MultiplierVerdict
 from solvers.constrained.relaxed_problem import RelaxedProblem
 
 
 @dataclass(frozen=True)
 class AugmentedLagrangian(Solver):
-    r"""Turn constraints into costs, and the costs into constraints again, round by round.
+    r"""Put constraints into the cost, and update multipliers and penalty until they are met.
 
     The relaxed problem (see ``RelaxedProblem``) is built once by the inner solver. After each of
     its runs the *referee* integrates the controls, and the multipliers at the nodes follow
@@ -30,10 +34,10 @@ class AugmentedLagrangian(Solver):
     It relaxes path constraints, state bounds and terminal constraints, of which a relaxed
     problem has none left; initial constraints, control bounds and a free final time stay with
     the inner solver, which may refuse them. It succeeds when the referee's violation is within
-    the tolerance, the complementarity is small and the inner solver stands behind its last
+    the tolerance, the complementarity is small and the inner solver succeeds in its last
     run; it is ``INFEASIBLE`` when the start itself violates a constraint, or, a local verdict,
     when a violation stays although the multipliers' term has outgrown the cost, and the inner
-    solver stands behind most of its runs.
+    solver succeeds in most of its runs.
 
     The multipliers are in ``history``: ``"multiplier"`` (N + 1, m) per second, at the nodes,
     and ``"terminal multiplier"``; per round ``"violation"``, ``"complementarity"``,
@@ -127,8 +131,31 @@ class AugmentedLagrangianProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         """Alternate between the inner solver and the multipliers."""
-        started = perf_counter()
+        started, s = perf_counter(), self.solver
         data = RunData.of(self.ocp, x0, t0, parameters)
-        ascent = MultiplierIteration(self, data)
-        status, message = ascent.climb(guess)
-        return ascent.solution(status, message, perf_counter() - started)
+        program = RelaxedProgram(self.ocp, self.relaxed, self.inner, s.intervals)
+        rule = MultiplierRule(s.penalty, s.growth, s.largest_penalty, s.tolerance)
+        verdict = MultiplierVerdict(program, rule, s.complementarity)
+        result = MultiplierIteration(program, rule, verdict, s.max_iterations).run(data, guess)
+        return self._solution(result).with_(solve_time=perf_counter() - started)
+
+    def _solution(self, result: MultiplierResult) -> Solution:
+        """Return the last round of a success, the least violating one of a failure."""
+        done = result.rounds
+        shown = done.rounds[-1] if result.status.is_success else done.best or done.lost[-1]
+        return shown.answer.with_(
+            solver=repr(self.solver),
+            status=result.status,
+            message=result.message,
+            cost=shown.verdict.cost,
+            iterations=done.count,
+            work=done.work,
+            history={
+                "multiplier": shown.used.path,
+                "terminal multiplier": shown.used.end,
+                "penalty": np.array([r.used.penalty for r in done.rounds]),
+                "violation": np.array([r.violation for r in done.rounds]),
+                "complementarity": np.array([r.complementarity for r in done.rounds]),
+                "cost": np.array([r.verdict.cost for r in done.rounds]),
+            },
+        )

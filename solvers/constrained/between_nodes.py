@@ -31,7 +31,7 @@ _MARGIN = "margin between the nodes"
 
 @dataclass(frozen=True)
 class BetweenNodes(Solver):
-    r"""A direct solver that the referee does not catch out between the nodes.
+    r"""A direct solver whose path constraints hold between the nodes as well.
 
     A direct method imposes path inequalities and state bounds at its nodes. Here they are
 
@@ -42,8 +42,8 @@ class BetweenNodes(Solver):
     runs are enough where the constraint only bulges; where the trajectory jumps *through* an
     obstacle from one node to the next, take more intervals.
 
-    Equations along the path get no margin: what a held control does to them between the nodes
-    no margin mends.
+    Equations along the path get no margin: none corrects what a held control does to them
+    between the nodes.
 
     Args:
         inner: the direct solver.
@@ -102,7 +102,7 @@ class BetweenNodesProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Run, let the referee look, widen the margins, and again."""
+        """Run, evaluate, widen the margins, and repeat."""
         started, tolerance = perf_counter(), self.solver.tolerance
         nodes = np.linspace(0.0, 1.0, self.solver.inner.intervals + 1)
         margin = np.zeros((len(nodes), self.rows.size))

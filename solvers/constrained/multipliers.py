@@ -23,6 +23,7 @@ class Multipliers:
         path: at the nodes, per second, (N + 1, m).
         end: of the terminal rows, (k,).
         penalty: rho.
+        aim: how far inside the update before this run aimed, for inequalities.
         scale: sigma, of the whole relaxed cost.
     """
 
@@ -30,13 +31,16 @@ class Multipliers:
     path: np.ndarray
     end: np.ndarray
     penalty: float
+    aim: float
     scale: float = 1.0
 
     @classmethod
-    def zero(cls, relaxed: RelaxedProblem, intervals: int, penalty: float) -> "Multipliers":
-        """Return those one starts with."""
+    def zero(
+        cls, relaxed: RelaxedProblem, intervals: int, penalty: float, *, aim: float
+    ) -> "Multipliers":
+        """Return the multipliers of the first run."""
         shape = (intervals + 1, relaxed.path.size)
-        return cls(relaxed, np.zeros(shape), np.zeros(relaxed.end.size), penalty)
+        return cls(relaxed, np.zeros(shape), np.zeros(relaxed.end.size), penalty, aim)
 
     def parameters(self) -> dict[str, ArrayLike]:
         """Return the values that the relaxed problem takes at run time."""
@@ -57,27 +61,29 @@ class Multipliers:
         """
         return replace(
             self,
-            path=self._pushed(self.path, path, self.relaxed.path.is_equation, aim),
-            end=self._pushed(self.end, end, self.relaxed.end.is_equation, aim),
+            path=self._first_order(self.path, path, self.relaxed.path.is_equation, aim),
+            end=self._first_order(self.end, end, self.relaxed.end.is_equation, aim),
             penalty=penalty,
+            aim=aim,
         )
 
     def halfway(self, other: "Multipliers") -> "Multipliers":
-        """Return what lies in the middle; of penalties and scales the geometric mean."""
+        """Return the mean; of penalties and scales the geometric mean; the aim of the other."""
         return replace(
             self,
             path=(self.path + other.path) / 2,
             end=(self.end + other.end) / 2,
             penalty=float(np.sqrt(self.penalty * other.penalty)),
+            aim=other.aim,
             scale=float(np.sqrt(self.scale * other.scale)),
         )
 
     def weight_of(self, path: np.ndarray, end: np.ndarray, duration: float) -> float:
-        """Return the integral of the multipliers times what is left of the rows, abs(c)."""
+        """Return the integral of the multipliers times the values of the rows, abs(mu c)."""
         along = np.abs(self.path * path).sum() / (len(self.path) - 1)
         return float(along * duration + np.abs(self.end * end).sum())
 
-    def _pushed(
+    def _first_order(
         self, multiplier: np.ndarray, c: np.ndarray, is_equation: np.ndarray, aim: float
     ) -> np.ndarray:
         inequality = np.maximum(0.0, multiplier + self.penalty * (c + aim))

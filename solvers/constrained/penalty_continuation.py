@@ -1,4 +1,4 @@
-"""The loop that thesis 3.3 sketches: raise the price of a collision until nobody pays it."""
+"""Penalty continuation: raise the penalty of a collision until no violation remains."""
 
 from typing import Literal
 
@@ -29,12 +29,12 @@ def penalty_continuation(
     most: int = 30,
     guess: InitialGuess | None = None,
 ) -> Solution:
-    """Solve a soft problem again and again, its price raised until a hard one is kept.
+    """Solve a soft problem with a rising penalty until the constraint of a hard one is met.
 
     The program is built once. Every run starts from the same guess: from a motion through the
-    obstacle a higher price leads to another one through it. Clear is what the *referee* finds
-    clear, between the nodes too. The price buys distance, so the answer costs
-    more than the optimum of the hard problem; ``AugmentedLagrangian`` finds that one.
+    obstacle a higher penalty leads to another one through it. The violation is the *referee's*,
+    between the nodes too. The penalty keeps a distance, so the answer costs more than the
+    optimum of the hard problem; ``AugmentedLagrangian`` finds that one.
     Source: thesis 3.3, the penalty method [Nocedal & Wright 2006, 17.1].
 
     Args:
@@ -48,40 +48,40 @@ def penalty_continuation(
         guess: where every run starts.
 
     Returns:
-        the last answer, as a solution of ``soft``; the price is in ``parameters``, and the
+        the last answer, as a solution of ``soft``; the penalty is in ``parameters``, and the
         violation of ``hard`` after every run in ``history["violation"]``. The status is the
-        solver's where the answer is clear, ``INFEASIBLE`` where even the last price was paid,
-        the solver's own failure where it failed.
+        solver's where the constraint is met, ``INFEASIBLE`` where the last penalty leaves a
+        violation, the solver's own failure where it failed.
 
     Raises:
         ProblemError: if the problems do not fit, or the parameter is none or not positive.
     """
-    check_instance(soft, OCP, "raise until clear: soft")
-    check_instance(hard, OCP, "raise until clear: hard")
-    check_instance(solver, Solver, "raise until clear: solver")
-    check_whole(most, "raise until clear: most")
-    price = _first_price(soft, parameter)
+    check_instance(soft, OCP, "penalty continuation: soft")
+    check_instance(hard, OCP, "penalty continuation: hard")
+    check_instance(solver, Solver, "penalty continuation: solver")
+    check_whole(most, "penalty continuation: most")
+    penalty = _first_penalty(soft, parameter)
     if (soft.model.nx, soft.model.nu) != (hard.model.nx, hard.model.nu) or not factor > 1.0:
-        raise ProblemError("raise until clear: the same model and a factor above 1 are needed")
-    check_positive(tolerance, "raise until clear: tolerance")
-    if not (price > 0.0).all():
+        raise ProblemError("penalty continuation: the same model and a factor above 1 are needed")
+    check_positive(tolerance, "penalty continuation: tolerance")
+    if not (penalty > 0.0).all():
         raise ProblemError(
-            f"raise until clear: '{parameter}' = {price}, it must be positive to be raised"
+            f"penalty continuation: '{parameter}' = {penalty}, it must be positive to be raised"
         )
     program = solver.build(soft)
     runs: list[Solution] = []
     verdicts: list[Evaluation] = []
     while len(runs) < most:
-        run = program.run(parameters={parameter: price}, guess=guess)
+        run = program.run(parameters={parameter: penalty}, guess=guess)
         runs.append(run)
         verdicts.append(evaluate(run.with_(problem=hard, parameters={}, control_kind=_kind(run))))
         if not run.status.is_success or verdicts[-1].violation <= tolerance:
             break
-        price = factor * price
+        penalty = factor * penalty
     return _summed(runs, verdicts, tolerance)
 
 
-def _first_price(soft: OCP, parameter: str) -> np.ndarray:
+def _first_penalty(soft: OCP, parameter: str) -> np.ndarray:
     known = {entry.name: entry for entry in soft.parameters}
     if parameter not in known:
         raise ProblemError(f"{soft.name} has no parameter '{parameter}'")
@@ -89,12 +89,12 @@ def _first_price(soft: OCP, parameter: str) -> np.ndarray:
 
 
 def _summed(runs: list[Solution], verdicts: list[Evaluation], tolerance: float) -> Solution:
-    """Return the last run with the work of all; not clear at the last price is infeasible."""
+    """Return the last run with the work of all; a violation at the last penalty is infeasible."""
     last, verdict = runs[-1], verdicts[-1]
     status, message = last.status, last.message
     if status.is_success and verdict.violation > tolerance:
         status = Status.INFEASIBLE
-        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at any price"
+        message = f"{verdict.worst} is violated by {verdict.violation:.3g} at the largest penalty"
     return last.with_(
         status=status,
         message=message,

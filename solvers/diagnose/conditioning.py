@@ -25,7 +25,7 @@ class Conditioning:
     with the free unknowns w and the gradients A of the active rows. It is balanced by a diagonal
     matrix on both sides until the largest entry of every row is 1 [Ruiz 2001]. What balancing
     takes away was scaling; what remains lies in the problem: rows that depend on each other, or
-    a direction in which nothing bends.
+    a direction without curvature.
 
     Attributes:
         raw: condition number as the problem is written.

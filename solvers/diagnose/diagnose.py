@@ -29,10 +29,10 @@ from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem
 from solvers.direct.multiple_shooting import MultipleShooting
 
-Check = Callable[[DiagnosedProblem], Iterator[Finding]]
+CheckFunction = Callable[[DiagnosedProblem], Iterator[Finding]]
 
 # Reading, evaluating, solving at one instant.
-_BEFORE: tuple[Check, ...] = (
+_BEFORE: tuple[CheckFunction, ...] = (
     not_finite,
     degrees,
     time_kind,
@@ -47,7 +47,7 @@ _BEFORE: tuple[Check, ...] = (
     guess,
 )
 # What a trial solve shows.
-_AFTER: tuple[Check, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
+_AFTER: tuple[CheckFunction, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
 
 # Enough for a trial; a solve that needs more is reported as such.
 _ITERATIONS = 200
@@ -56,8 +56,8 @@ _ITERATIONS = 200
 def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     """Say what is wrong with a problem, or with the problem behind a solution.
 
-    Every check looks for one kind of mistake; what it finds names constraint, state or control,
-    instant, unit and amount, and says what to do. Where a check that needs no solve finds an
+    Every check looks for one kind of mistake; its findings name constraint, state or control,
+    instant, unit and amount, and what to do. Where a check that needs no solve finds an
     error, no solve is tried: what it would show is a consequence.
 
     Args:
@@ -75,7 +75,7 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     if not isinstance(asked, OCP | Solution):
         raise ProblemError(f"diagnose takes an OCP or a Solution, not {type(asked).__name__}")
     subject = _subject(asked, MultipleShooting(intervals, max_iterations=_ITERATIONS))
-    with np.errstate(all="ignore"):  # what is not finite is looked for, not warned of
+    with np.errstate(all="ignore"):  # checks report what is not finite; no warnings
         findings = [finding for check in _BEFORE for finding in check(subject)]
         if not any(f.severity is Severity.ERROR for f in findings):
             findings += [finding for check in _AFTER for finding in check(subject)]
@@ -90,7 +90,7 @@ def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProble
 
 
 def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Finding]:
-    """Say so where the trial failed and nothing that was found explains it."""
+    """Return that the trial failed, where no finding explains it."""
     trial = subject.trial
     if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
         return

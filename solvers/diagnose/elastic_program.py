@@ -1,4 +1,4 @@
-"""How far constraints must give way, and the fewest that exclude each other."""
+"""The elastic problem: least violation of constraints, and the fewest that exclude each other."""
 
 from collections.abc import Iterable
 from contextlib import redirect_stderr
@@ -9,10 +9,10 @@ from io import StringIO
 import casadi as ca
 import numpy as np
 
-# A constraint that must give way by more than this, relative to its size, is violated.
+# A constraint violated by more than this, relative to its size, counts as violated.
 VIOLATED = 1e-5
 # Weight of the distance from the first iterate, which picks one of many answers. The penalty on
-# the slack is exact, so that it does not stretch what can be met.
+# the slack is exact, so that what can be met has none.
 _NEAR = 1e-5
 _OPTIONS = {
     "expand": True,
@@ -27,13 +27,13 @@ _OPTIONS = {
 
 @dataclass(frozen=True)
 class Demand:
-    """What one or several rows ask for; it gives way as a whole.
+    """One or several rows of constraints that share one slack.
 
     Attributes:
         where: the constraint, state or control it belongs to.
-        label: how a sentence calls it.
+        label: its name in a sentence.
         unit: of its violation.
-        size: by how much it has to give way to count as 1.
+        size: the violation that counts as 1.
         is_control: whether it is a bound of a control.
     """
 
@@ -46,17 +46,17 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class ElasticSolution:
-    """An answer of the elastic problem.
+    """A solution of the elastic problem.
 
     Attributes:
         w: the unknowns.
-        stretch: by how much each demand gives way, (G,).
+        slack: violation of each demand, (G,).
         weight: multiplier of every row, (m,).
         found: whether the solver converged.
     """
 
     w: np.ndarray
-    stretch: np.ndarray
+    slack: np.ndarray
     weight: np.ndarray
     found: bool
 
@@ -69,13 +69,13 @@ class ElasticProgram:
               \text{lower} - s_{g(i)} \le e_i(w) \le \text{upper} + s_{g(i)}, \quad
               \text{hard}(w) = 0
 
-    A local answer: where the rows are not convex, what it calls impossible is impossible near
-    where it started. Source: [Chinneck 2008].
+    A local solution: where the rows are not convex, demands that exclude each other do so near
+    the first iterate. Source: [Chinneck 2008].
 
     Attributes:
         w: unknowns.
         p: data; empty where there are none.
-        hard: what must vanish, come what may.
+        hard: must vanish, without slack.
         rows: e(w), (m,).
         lower: (m,).
         upper: (m,).
@@ -119,12 +119,12 @@ class ElasticProgram:
         kept: Iterable[int],
         soft: Iterable[int] | None = None,
     ) -> ElasticSolution:
-        """Solve with the ``kept`` demands only, of which the ``soft`` ones (all) may give way."""
+        """Solve with the ``kept`` demands only, of which the ``soft`` ones (all) have slack."""
         kept = list(kept)
         on = np.isin(self.owner, kept)
         gives = np.isin(np.arange(len(self.demands)), kept if soft is None else list(soft))
         many, zeros = np.full(len(on), np.inf), np.zeros(self.hard.numel())
-        # CasADi warns of multipliers that are not finite, whatever its options say.
+        # CasADi warns of multipliers that are not finite, also with warnings off.
         with redirect_stderr(StringIO()):
             answer = self._nlp(
                 x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
@@ -140,32 +140,32 @@ class ElasticProgram:
         split = len(values) - len(gives)
         return ElasticSolution(
             w=values[:split],
-            stretch=np.maximum(values[split:], 0.0),
+            slack=np.maximum(values[split:], 0.0),
             weight=np.abs(weights).sum(axis=0),
             found=bool(self._nlp.stats()["success"] and finite),
         )
 
     def excess(self, answer: ElasticSolution) -> np.ndarray:
-        """Return by how much each demand gives way, relative to its size."""
-        return answer.stretch / self._sizes
+        """Return the violation of each demand, relative to its size."""
+        return answer.slack / self._sizes
 
     def is_possible(self, answer: ElasticSolution) -> bool:
-        """Whether nothing has to give way."""
+        """Whether all demands are met."""
         return answer.found and float(self.excess(answer).sum()) <= VIOLATED
 
     def conflict(self, first: ElasticSolution, p: np.ndarray) -> tuple[int, ...]:
         """Return a smallest set of demands that exclude each other, by the deletion filter.
 
-        Demands without a multiplier go at once, if the rest is still impossible; then each of
-        the others, one by one: what can go while the rest stays impossible was not needed.
+        Demands without a multiplier are removed at once, if the rest is still impossible; then
+        each of the others is removed where the rest stays impossible.
         """
-        price = np.zeros(len(self.demands))
-        np.add.at(price, self.owner, first.weight)
+        weight = np.zeros(len(self.demands))
+        np.add.at(weight, self.owner, first.weight)
         kept = list(range(len(self.demands)))
-        needed = [i for i in kept if price[i] > 1e-6 * price.max(initial=0.0)]
+        needed = [i for i in kept if weight[i] > 1e-6 * weight.max(initial=0.0)]
         if len(needed) < len(kept) and self._impossible(first, p, needed):
             kept = needed
-        for demand in sorted(kept, key=lambda i: price[i]):
+        for demand in sorted(kept, key=lambda i: weight[i]):
             fewer = [i for i in kept if i != demand]
             if fewer and self._impossible(first, p, fewer):
                 kept = fewer

@@ -10,7 +10,7 @@ from ocp import OCP, Solution
 from ocp.internal import RunData
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
-# Random points around the guess, for what must hold wherever one looks.
+# Random points around the guess, for what must hold everywhere.
 _RANDOM = 20
 # Intervals of the elastic problem, which is solved a dozen times.
 _COARSE = 30
@@ -88,7 +88,7 @@ class DiagnosedProblem:
 
     @cached_property
     def trial(self) -> Solution:
-        """What the direct method makes of it."""
+        """The solution of the direct method."""
         guess = self.given if self.given is not None and self.given.status.is_success else None
         values = self.data.values.as_dict()
         return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)

@@ -10,7 +10,7 @@ from solvers.diagnose.demands import of_box, of_constraint
 from solvers.diagnose.elastic_program import Demand, ElasticProgram
 from solvers.diagnose.subject import DiagnosedProblem
 
-# Rows that hold whatever else gives way.
+# Rows without slack.
 _HARD = ("dynamics", "time")
 
 

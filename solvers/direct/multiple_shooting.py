@@ -1,16 +1,21 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver
-from ocp.internal import RunData, Transcription, check_instance, check_positive, check_whole
+from ocp import OCP, RK4, InitialGuess, Integrator, Solver
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    Transcription,
+    check_instance,
+    check_positive,
+    check_whole,
+)
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
@@ -78,15 +83,14 @@ class MultipleShooting(Solver):
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         grid = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
         nlp = self.nlp_backend.build(transcription)
-        return MultipleShootingProgram(self, transcription, grid, nlp)
+        return MultipleShootingProgram(self, ocp, transcription, grid, nlp)
 
 
 @dataclass(frozen=True, eq=False)
-class MultipleShootingProgram(Program):
+class MultipleShootingProgram(MethodProgram):
     """A transcribed problem with its backend.
 
     Attributes:
-        solver: the options.
         transcription: the problem on its grid.
         grid: for first iterates, and to check the integrator.
         nlp: the backend, set up.
@@ -97,21 +101,11 @@ class MultipleShootingProgram(Program):
     grid: ShootingGrid
     nlp: Nlp
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        started = perf_counter()
-        ocp = self.transcription.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        z, u = self.first_iterate(data, ocp.first_guess(guess))
+        z, u = self.first_iterate(data, guess)
         outcome = self._nlp_run.solve(self.transcription.join(z, u), data)
-        return self._solution(data, outcome, perf_counter() - started)
+        return self._result(data, outcome)
 
     @cached_property
     def _nlp_run(self) -> NlpRun:
@@ -145,18 +139,15 @@ class MultipleShootingProgram(Program):
         schedule = self.grid.schedule(data, tr.duration(result.w))
         return self.grid.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _solution(self, data: RunData, outcome: NlpOutcome, seconds: float) -> Solution:
+    def _result(self, data: RunData, outcome: NlpOutcome) -> RunResult:
         """The last result, with the work of all runs."""
         tr, result = self.transcription, outcome.last
         z, u = tr.split(result.w)
-        return Solution(
-            problem=tr.ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=outcome.status,
             message=outcome.message,
             t=self._nlp_run.times(result, data),
             x=z[:, : tr.ocp.model.nx],
-            x0=data.x0,
             costate=tr.costates(result.w, result.lam_x, result.lam_g, data),
             u=u,
             cost=result.cost,
@@ -164,6 +155,4 @@ class MultipleShootingProgram(Program):
             iterations=outcome.iterations,
             work=outcome.work,
             history=outcome.history(),
-            parameters=data.values.as_dict(),
-            solve_time=seconds,
         )

@@ -1,4 +1,4 @@
-"""Which way a gradient method goes: against the gradient, or conjugate to its last way."""
+"""The search direction of a gradient method: steepest descent, or conjugate to the last one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ class DescentStep:
     """What one iteration leaves to the next.
 
     Attributes:
-        gradient: g, where it began.
-        direction: s, where it went.
+        gradient: g, at its start.
+        direction: s, of the search.
         slope: (g, s), dJ/dstep, negative for a descent.
-        step: how far it went.
+        step: length of the step along s.
     """
 
     gradient: np.ndarray
@@ -39,7 +39,7 @@ def search_direction(
 
     with beta = 0 for ``"steepest"``, (g, g) / (g', g') for ``"fletcher-reeves"`` (g' the
     gradient before; Algorithm 2) and max(0, (g, g - g') / (g', g')) for ``"polak-ribiere"``,
-    which begins anew where conjugacy is lost or the direction would climb.
+    which restarts where conjugacy is lost or the direction would not descend.
 
     Args:
         rule: one of the three.

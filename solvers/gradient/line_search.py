@@ -1,8 +1,8 @@
-"""How far a gradient method goes along a direction."""
+"""Step rules of a gradient method: a fixed step, or backtracking to a sufficient decrease."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,16 +24,21 @@ class LineSearchTrial:
     cost: float
 
 
+class AcceptedStep(NamedTuple):
+    """The trial that a rule accepts, and the step to it."""
+
+    trial: LineSearchTrial
+    step: float
+
+
 Probe = Callable[[float], LineSearchTrial]
 
 
 class StepRule(Protocol):
     """Chooses a point along a direction."""
 
-    def advance(
-        self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[LineSearchTrial, float] | None:
-        """Return the accepted trial and the step to it, or None if no step is acceptable.
+    def advance(self, probe: Probe, cost: float, slope: float, first: float) -> AcceptedStep | None:
+        """Return the accepted step, or None if no step is acceptable.
 
         Args:
             probe: step -> the trial there.
@@ -58,11 +63,9 @@ class FixedStep:
         """Check the step."""
         check_positive(self.alpha, "fixed step: alpha")
 
-    def advance(
-        self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[LineSearchTrial, float] | None:
+    def advance(self, probe: Probe, cost: float, slope: float, first: float) -> AcceptedStep | None:
         """Return the trial at ``alpha``."""
-        return probe(self.alpha), self.alpha
+        return AcceptedStep(probe(self.alpha), self.alpha)
 
 
 @dataclass(frozen=True)
@@ -86,9 +89,7 @@ class Armijo:
         check_positive(self.decrease, "Armijo: decrease", below=0.5)
         check_whole(self.most, "Armijo: most")
 
-    def advance(
-        self, probe: Probe, cost: float, slope: float, first: float
-    ) -> tuple[LineSearchTrial, float] | None:
+    def advance(self, probe: Probe, cost: float, slope: float, first: float) -> AcceptedStep | None:
         """Return the first trial that lies low enough, improved once by interpolation."""
         step = first
         for _ in range(self.most):
@@ -100,19 +101,21 @@ class Armijo:
         return None
 
 
-def _improved(
-    probe: Probe, trial: LineSearchTrial, step: float, minimum: float
-) -> tuple[LineSearchTrial, float]:
+def _improved(probe: Probe, trial: LineSearchTrial, step: float, minimum: float) -> AcceptedStep:
     if abs(minimum - step) > 0.2 * step:
         other = probe(minimum)
         if other.cost < trial.cost:
-            return other, minimum
-    return trial, step
+            return AcceptedStep(other, minimum)
+    return AcceptedStep(trial, step)
 
 
 def _parabola_minimum(cost: float, slope: float, step: float, cost_there: float) -> float:
     """Where the parabola is lowest, at most ten steps away; a tenth where the cost is inf."""
-    bend = cost_there - cost - slope * step
-    if not np.isfinite(bend):
+    curvature = cost_there - cost - slope * step
+    if not np.isfinite(curvature):
         return 0.1 * step
-    return 10.0 * step if bend <= 0.0 else min(10.0 * step, step * (-slope * step / (2.0 * bend)))
+    return (
+        10.0 * step
+        if curvature <= 0.0
+        else min(10.0 * step, step * (-slope * step / (2.0 * curvature)))
+    )

@@ -1,12 +1,9 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
@@ -15,17 +12,22 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Program,
-    Solution,
     Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
-from ocp.internal import RunData, check_instance, check_not_negative, check_whole
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_not_negative,
+    check_whole,
+)
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
-from solvers.gradient.line_search import Armijo, FixedStep, LineSearchTrial, StepRule
+from solvers.gradient.line_search import AcceptedStep, Armijo, FixedStep, StepRule
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ class Schuetz(Solver):
         sweeps = AdjointSweeps.of(
             ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled
         )
-        return SchuetzProgram(self, sweeps)
+        return SchuetzProgram(self, ocp, sweeps)
 
 
 def _refuse_constraints(ocp: OCP) -> None:
@@ -111,59 +113,61 @@ def _refuse_constraints(ocp: OCP) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class SchuetzProgram(Program):
+class SchuetzProgram(MethodProgram):
     """Roll-out and costate sweep of a problem.
 
     Attributes:
-        solver: the options.
         sweeps: both integrations.
     """
 
     solver: Schuetz
     sweeps: AdjointSweeps
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Descend from the guessed controls, zero unless given."""
-        started = perf_counter()
-        ocp = self.sweeps.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        objective, start = Objective(self.sweeps, data), ocp.first_guess(guess)
-        u = start.sample("u", objective.nodes[:-1], ocp.model.nu) if start else None
+        ocp, objective = self.ocp, Objective(self.sweeps, data)
+        u = guess.sample("u", objective.nodes[:-1], ocp.model.nu) if guess else None
         descent = _Descent(
             self.solver, objective, np.zeros((self.sweeps.n, ocp.model.nu)) if u is None else u
         )
-        with np.errstate(over="ignore", invalid="ignore"):  # a descent may climb to overflow
-            status, message = descent.descend()
-        best = descent.here if status is Status.STATIONARY else descent.best
-        return Solution(
-            problem=ocp,
-            solver=repr(self.solver),
-            status=status,
-            message=message,
-            t=t0 + objective.nodes * ocp.duration,
-            x=best.trial.x,
-            x0=data.x0,
-            costate=best.costate,
-            u=best.trial.u,
-            cost=best.trial.cost,
-            residual=objective.residual(best),
-            iterations=len(descent.costs) - 1,
+        with np.errstate(over="ignore", invalid="ignore"):  # the cost may rise until it overflows
+            found = descent.run()
+        shown = found.iterate
+        return RunResult(
+            status=found.status,
+            message=found.message,
+            t=data.t0 + objective.nodes * ocp.duration,
+            x=shown.trial.x,
+            costate=shown.costate,
+            u=shown.trial.u,
+            cost=shown.trial.cost,
+            residual=objective.residual(shown),
+            iterations=len(found.costs) - 1,
             work=Work(rollouts=objective.rollouts, jacobians=objective.backward),
-            history={"cost": np.array(descent.costs), "residual": np.array(descent.residuals)},
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
+            history={"cost": np.array(found.costs), "residual": np.array(found.residuals)},
         )
 
 
+class _DescentResult(NamedTuple):
+    """How a descent ended.
+
+    Attributes:
+        status: the termination test that held.
+        message: what the status alone does not say.
+        iterate: the last one where it is stationary, else the one with the least cost.
+        costs: of the iterates.
+        residuals: largest projected gradient of each.
+    """
+
+    status: Status
+    message: str
+    iterate: ControlIterate
+    costs: list[float]
+    residuals: list[float]
+
+
 class _Descent:
-    """Algorithm 2 from some controls: where it is, where the cost was least, how it got there."""
+    """Algorithm 2 from some controls: the iterate, the best one so far, and their history."""
 
     def __init__(self, solver: Schuetz, objective: Objective, u: np.ndarray) -> None:
         self.solver, self.objective = solver, objective
@@ -171,8 +175,13 @@ class _Descent:
         self.costs = [self.here.trial.cost]
         self.residuals = [objective.residual(self.here)]
 
-    def descend(self) -> tuple[Status, str]:
-        """Iterate until a termination test holds; return which, with what there is to say."""
+    def run(self) -> _DescentResult:
+        """Iterate until a termination test holds."""
+        status, message = self._iterate()
+        shown = self.here if status is Status.STATIONARY else self.best
+        return _DescentResult(status, message, shown, self.costs, self.residuals)
+
+    def _iterate(self) -> tuple[Status, str]:
         if not self.here.is_finite:
             return Status.DIVERGED, "the first controls make the state or its costate blow up"
         objective, last = self.objective, None
@@ -185,8 +194,8 @@ class _Descent:
             accepted = self._advance(s, slope, self._first_step(s, slope, last))
             if accepted is None:
                 return Status.NO_PROGRESS, f"projected gradient {self.residuals[-1]:.3g}"
-            trial, step = accepted
-            here, last = objective.differentiated(trial), DescentStep(g, s, slope, step)
+            here = objective.differentiated(accepted.trial)
+            last = DescentStep(g, s, slope, accepted.step)
             if not here.is_finite:
                 done = len(self.costs)
                 return Status.DIVERGED, f"after {done} iterations the state or its costate blows up"
@@ -201,9 +210,7 @@ class _Descent:
         """Whether no component of the projected gradient is left."""
         return self.residuals[-1] <= self.solver.stationarity
 
-    def _advance(
-        self, s: np.ndarray, slope: float, first: float
-    ) -> tuple[LineSearchTrial, float] | None:
+    def _advance(self, s: np.ndarray, slope: float, first: float) -> AcceptedStep | None:
         """Roll out u + step s, with the step that the rule accepts."""
         u, cost = self.here.trial.u, self.here.trial.cost
         return self.solver.step.advance(

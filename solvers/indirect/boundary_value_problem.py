@@ -10,7 +10,12 @@ from ocp import OCP, Integrator, MinimumPrinciple, minimum_principle
 from ocp.internal import BufferedFunction, compiled
 from solvers.indirect.canonical_flow import canonical_step, end_conditions, start_conditions
 from solvers.indirect.newton_system import block_matrix
-from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSchedule, UnknownsLayout
+from solvers.indirect.shooting_segments import (
+    CanonicalTrajectory,
+    SegmentTrajectories,
+    ShootingSchedule,
+    UnknownsLayout,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +84,7 @@ class ExtremalProblem:
     def residual(
         self, v: np.ndarray, schedule: ShootingSchedule, x0: np.ndarray
     ) -> tuple[np.ndarray, SegmentTrajectories]:
-        """Return start conditions, gaps between segments, end conditions; and the paths."""
+        """Return start conditions, defects between segments, end conditions; and the paths."""
         z, mu, nu, duration = self.shape.split(v, schedule.duration)
         paths = self.paths(z, schedule, duration)
         end = self.ends(paths.ends[-1], nu, schedule.t0 + duration, schedule.p_last)[0]
@@ -142,21 +147,22 @@ class ExtremalProblem:
 
     def trajectory(
         self, paths: SegmentTrajectories, schedule: ShootingSchedule, duration: float
-    ) -> tuple[np.ndarray, ...]:
-        """Return t, x, costate and u at every step of the horizon."""
+    ) -> CanonicalTrajectory:
+        """Return the trajectory at every step of the horizon."""
         z, nx = paths.nodes, self.shape.nx
         t = schedule.t0 + schedule.fractions * duration
         p = np.vstack([schedule.p_left, schedule.p_last])
         control = self.optimality.control.map(len(t))
         u = control(z[:, :nx].T, z[:, nx:].T, t[None, :], p.T)
-        return t, z[:, :nx], z[:, nx:], np.array(u).T
+        return CanonicalTrajectory(t, z[:, :nx], z[:, nx:], np.array(u).T)
 
-    def still(self, x0: np.ndarray, schedule: ShootingSchedule) -> tuple[np.ndarray, ...]:
-        """Return a finite t, x, costate and u that stand still, where there is none to return."""
+    def still(self, x0: np.ndarray, schedule: ShootingSchedule) -> CanonicalTrajectory:
+        """Return a constant trajectory, which is finite: where a run has found none."""
         ocp, nodes = self.ocp, schedule.fractions
         u = ocp.control_bounds.clip(np.zeros((len(nodes), ocp.model.nu)))
         x = np.tile(x0, (len(nodes), 1))
-        return schedule.t0 + nodes * ocp.duration, x, np.zeros_like(x), u
+        t = schedule.t0 + nodes * ocp.duration
+        return CanonicalTrajectory(t, x, np.zeros_like(x), u)
 
     # -- pieces ----------------------------------------------------------------------------
 

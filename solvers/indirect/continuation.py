@@ -1,4 +1,4 @@
-"""Where Newton fails from a guess: an easier problem first, moved to the wanted one."""
+"""Continuation where Newton fails from a guess: from an easier problem to the wanted one."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The unknowns that Newton begins with, from whatever a guess has to offer."""
+"""The first iterate of Newton's method, from the parts that a guess has."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def first_unknowns(
 ) -> np.ndarray:
     """Return the unknowns of the boundary value problem, see ``UnknownsLayout``.
 
-    What the guess lacks stands still: states at the start, costates zero.
+    Without states in the guess they are constant at the start, without costates those are zero.
     """
     shape, ocp = extremals.shape, extremals.ocp
     nodes = np.linspace(0.0, 1.0, shape.segments + 1)

@@ -1,12 +1,9 @@
 """Indirect shooting: Newton-Raphson on the minimum principle's boundary value problem."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
@@ -14,13 +11,19 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Program,
     Solution,
     Solver,
     UnsupportedProblem,
     Work,
 )
-from ocp.internal import RunData, check_instance, check_positive, check_whole
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_positive,
+    check_whole,
+)
 from solvers.indirect.boundary_value_problem import ExtremalProblem
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation, advanced
 from solvers.indirect.finite_difference_sensitivities import perturbed_slopes, varied
@@ -97,41 +100,30 @@ class IndirectShooting(Solver):
         extremals = ExtremalProblem.of(
             ocp, self.segments, per_segment, self.integrator, fast=self.compiled
         )
-        return IndirectShootingProgram(self, extremals)
+        return IndirectShootingProgram(self, ocp, extremals)
 
 
 @dataclass(frozen=True, eq=False)
-class IndirectShootingProgram(Program):
+class IndirectShootingProgram(MethodProgram):
     """A boundary value problem, ready for Newton."""
 
     solver: IndirectShooting
     extremals: ExtremalProblem
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; a guess needs costates, else they start at zero."""
-        started = perf_counter()
-        ocp = self.extremals.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        start = ocp.first_guess(guess)
-        v = first_unknowns(self.extremals, data, self.schedule(data), start)
+        v = first_unknowns(self.extremals, data, self.schedule(data), guess)
         results = [self._newton(data, 1.0, v)]
         if not results[0].converged and self.solver.continuation:
             results += advanced(self.solver.continuation, data, v, self._newton)
-        return self._solution(data, results, perf_counter() - started)
+        return self._result(data, results)
 
     def second_order(self, solution: Solution) -> SecondOrder:
         """Test whether an extremal that this program found is a minimum."""
         schedule = self.schedule(solution.data)
         v = first_unknowns(self.extremals, solution.data, schedule, solution)
-        z, _, _, duration = self.extremals.shape.split(v, schedule.duration)
-        paths = self.extremals.paths(z, schedule, duration)
+        at = self.extremals.shape.split(v, schedule.duration)
+        paths = self.extremals.paths(at.z, schedule, at.duration)
         return second_order(self.extremals, v, schedule, paths)
 
     def schedule(self, data: RunData, share: float = 1.0) -> ShootingSchedule:
@@ -163,37 +155,31 @@ class IndirectShootingProgram(Program):
         self, v: np.ndarray, paths: SegmentTrajectories, schedule: ShootingSchedule
     ) -> tuple[np.ndarray, np.ndarray]:
         ext = self.extremals
-        z, _, _, duration = ext.shape.split(v, schedule.duration)
+        at = ext.shape.split(v, schedule.duration)
         if self.solver.jacobian == "exact":
-            return ext.segment_slopes(paths, schedule, duration)
-        return perturbed_slopes(ext, z, paths, schedule, duration, self.solver.delta)
+            return ext.segment_slopes(paths, schedule, at.duration)
+        return perturbed_slopes(ext, at.z, paths, schedule, at.duration, self.solver.delta)
 
     # -- out ---------------------------------------------------------------------------
 
-    def _solution(self, data: RunData, results: list[NewtonResult], seconds: float) -> Solution:
+    def _result(self, data: RunData, results: list[NewtonResult]) -> RunResult:
         ext, last, schedule = self.extremals, results[-1], self.schedule(data)
         motion = ExtremalMotion.of(ext, last.x, schedule)
         status, message = verdict(ext, motion, schedule, last, self.solver.max_steps)
-        shown = (motion.t, motion.x, motion.costate, motion.u)
-        t, x, costate, u = shown if motion.exists else ext.still(data.x0, schedule)
-        return Solution(
-            problem=ext.ocp,
-            solver=repr(self.solver),
+        shown = motion if motion.exists else ext.still(data.x0, schedule)
+        return RunResult(
             status=status,
             message=message,
-            t=t,
-            x=x,
-            x0=data.x0,
-            costate=costate,
-            u=u,
+            t=shown.t,
+            x=shown.x,
+            costate=shown.costate,
+            u=shown.u,
             control_kind="extremal",
             cost=motion.cost if motion.exists else np.inf,
             residual=last.residual,
             iterations=sum(r.steps for r in results),
             work=self._work(results),
             history={"residual": last.history},
-            parameters=data.values.as_dict(),
-            solve_time=seconds,
         )
 
     def _work(self, results: list[NewtonResult]) -> Work:

@@ -1,4 +1,4 @@
-"""What Newton's last iterate is: an extremal as asked for, or what it lacks."""
+"""Status of Newton's last iterate: an extremal, or why it is none."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _CONCAVE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ExtremalMotion:
-    """The trajectory that unknowns stand for.
+    """The trajectory of given unknowns.
 
     Attributes:
         paths: its segments.
@@ -41,11 +41,11 @@ class ExtremalMotion:
         cls, extremals: ExtremalProblem, v: np.ndarray, schedule: ShootingSchedule
     ) -> "ExtremalMotion":
         """Integrate from the unknowns ``v``."""
-        z, _, _, duration = extremals.shape.split(v, schedule.duration)
-        paths = extremals.paths(z, schedule, duration)
-        t, x, costate, u = extremals.trajectory(paths, schedule, duration)
+        at = extremals.shape.split(v, schedule.duration)
+        paths = extremals.paths(at.z, schedule, at.duration)
+        t, x, costate, u = extremals.trajectory(paths, schedule, at.duration)
         end = extremals.ocp.functions.terminal_cost(x[-1], t[-1], schedule.p_last)
-        return cls(paths, duration, t, x, costate, u, float(paths.costs.sum()) + float(end))
+        return cls(paths, at.duration, t, x, costate, u, float(paths.costs.sum()) + float(end))
 
     @property
     def exists(self) -> bool:

@@ -1,4 +1,4 @@
-"""Is an extremal a minimum? The second-order test: Legendre, and no conjugate point."""
+"""The second-order test of an extremal: Legendre's condition, and no conjugate point."""
 
 from dataclasses import dataclass
 

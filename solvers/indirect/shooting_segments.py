@@ -1,6 +1,7 @@
-"""A horizon cut into segments: when they integrate, what is unknown, what comes out."""
+"""A horizon cut into segments: their schedule, the unknowns, and the trajectories."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +59,38 @@ class ShootingSchedule:
         )
 
 
+class ShootingUnknowns(NamedTuple):
+    """The unknowns of indirect shooting.
+
+    Attributes:
+        z: (x, costate) at the start of each segment, (S, 2 nx).
+        mu: multipliers of the initial constraints.
+        nu: multipliers of the terminal constraints.
+        duration: final time minus t0 [s], the given one where it is fixed.
+    """
+
+    z: np.ndarray
+    mu: np.ndarray
+    nu: np.ndarray
+    duration: float
+
+
+class CanonicalTrajectory(NamedTuple):
+    """States, costates and minimising controls at N + 1 instants.
+
+    Attributes:
+        t: instants [s], (N + 1,).
+        x: states (N + 1, nx).
+        costate: (N + 1, nx).
+        u: controls (N + 1, nu).
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    costate: np.ndarray
+    u: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class UnknownsLayout:
     """How the unknowns are stacked: z of each segment's start, then mu, nu and the duration."""
@@ -72,14 +105,13 @@ class UnknownsLayout:
         """Return the vector of unknowns."""
         return np.concatenate([z.ravel(), mu, nu, [duration] if self.free_time else []])
 
-    def split(
-        self, v: np.ndarray, duration: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Return z (S, 2 nx), mu, nu and the duration, which is the given one where fixed."""
+    def split(self, v: np.ndarray, duration: float) -> ShootingUnknowns:
+        """Return the parts of a vector of unknowns; ``duration``: where it is fixed."""
         z, mu, nu, rest = np.split(
             v, np.cumsum([2 * self.nx * self.segments, self.n_mu, self.n_nu])
         )
-        return z.reshape(self.segments, -1), mu, nu, float(rest[0]) if self.free_time else duration
+        duration = float(rest[0]) if self.free_time else duration
+        return ShootingUnknowns(z.reshape(self.segments, -1), mu, nu, duration)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What half the integration steps would change about an extremal, without solving again."""
+"""By how much half the integration step would change an extremal, without solving again."""
 
 from dataclasses import dataclass, replace
 
@@ -10,7 +10,7 @@ from solvers.indirect.indirect_shooting import IndirectShootingProgram
 
 @dataclass(frozen=True)
 class HalvingChange:
-    """The error of the steps, as far as halving them tells.
+    """The error of the steps, estimated by halving them.
 
     Attributes:
         cost: of the optimal cost, to first order.
@@ -25,7 +25,7 @@ def finer(program: IndirectShootingProgram) -> IndirectShootingProgram:
     """Return the program with half the step."""
     extremals = program.extremals.finer()
     steps = extremals.shape.segments * extremals.steps
-    return IndirectShootingProgram(replace(program.solver, steps=steps), extremals)
+    return IndirectShootingProgram(replace(program.solver, steps=steps), program.ocp, extremals)
 
 
 def change_when_halved(

@@ -7,7 +7,7 @@ import numpy as np
 
 from solvers.kinematic.pseudo_inverse import Inverse
 
-# A direction counts as used up by a task if J N moves along it by more than this share of
+# A direction counts as used by a task if J N moves along it by more than this share of
 # the task's own J.
 _RANK = 1e-6
 
@@ -38,7 +38,7 @@ def prioritised_velocity(levels: Sequence[Level], n: int, *, decoupled: bool) ->
 
     with two tasks (3.11). A task that is partly active, 0 < α < 1, is α times the answer
     with it plus 1 - α times the answer without it: for the last task that is (3.16), tasks
-    below another one are continuous in α, and those above never notice.
+    below another one are continuous in α, and those above are not affected.
 
     With ``decoupled`` N_i loses the exact row space of J_i N_(i-1) (its right singular
     vectors), whatever damping the inverse has: damping then costs a task some of its own

@@ -141,7 +141,7 @@ class KinematicProgram:
 
 
 def refuse_dependent(program: KinematicProgram) -> None:
-    """Refuse rigid tasks whose rows depend on each other wherever one looks.
+    """Refuse rigid tasks whose rows depend on each other everywhere.
 
     Raises:
         ProblemError: naming the first such task.

@@ -1,4 +1,4 @@
-"""What a kinematic controller did, and the same as a solution that the referee can judge."""
+"""The motion under a kinematic controller, also as a solution that the referee can evaluate."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -28,7 +28,7 @@ class Repulsion:
     [Maciejewski & Klein 1985].
 
     v0, d_m and d_i may be CasADi symbols, for tasks whose Jacobians and demands are compiled as
-    functions of them; then nobody checks their values.
+    functions of them; then their values are not checked.
 
     Args:
         v0: repulsive speed where α_v = 1, that is at d = d_m / √2 [m/s], positive.

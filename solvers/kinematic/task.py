@@ -1,4 +1,4 @@
-"""What a kinematic controller is asked for: a value, and how fast it should change."""
+"""A task of a kinematic controller: a value, and the velocity that is wanted of it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -80,7 +80,7 @@ class Task:
 
     @property
     def desired_velocity(self) -> ca.SX:
-        """What J dq/dt has to be (m,): the wanted velocity without that of time alone."""
+        """J dq/dt (m,): the desired velocity without that of time alone."""
         return ca.densify(self.rate - ca.jacobian(self.value, self.t))
 
     @property

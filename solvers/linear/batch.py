@@ -1,17 +1,14 @@
 """The batch approach: all inputs of a linear-quadratic problem from one linear system."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ocp import OCP, InitialGuess, Program, Solution, Solver, Status, linear_quadratic
-from ocp.internal import LinearQuadratic, LQData, Matrices
+from ocp import OCP, InitialGuess, Solver, Status, Work, linear_quadratic
+from ocp.internal import LinearQuadratic, LQData, Matrices, MethodProgram, RunData, RunResult
 from solvers.linear import regulator_gains as recursion
-from solvers.linear.linear_run import LinearRun
 from solvers.linear.stacked_prediction import StackedPrediction
 
 # Above this condition number of H the inputs have fewer than about eight correct digits.
@@ -39,10 +36,8 @@ class Batch(Solver):
         """Stack and factorise."""
         lq = linear_quadratic(ocp)
         recursion.refuse_constraints(lq, "Batch")
-        program = BatchProgram(self, lq)
-        if lq.fixed is not None:
-            _ = program.fixed
-        return program
+        fixed = None if lq.fixed is None else _stacked(self, ocp, lq.fixed)
+        return BatchProgram(self, ocp, lq, fixed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,42 +48,53 @@ class _Stacked:
     factor: tuple[np.ndarray, bool] | None
 
 
+def _stacked(solver: Batch, ocp: OCP, matrices: Matrices) -> _Stacked:
+    steps, n, m = matrices.B.shape
+    feedback = np.zeros((steps, m, n))
+    if solver.prestabilise:
+        feedback = recursion.stabilising(matrices, ocp.name)
+    prediction = StackedPrediction.of(matrices, feedback)
+    try:
+        return _Stacked(prediction, cho_factor(prediction.hessian))
+    except (LinAlgError, ValueError):  # not positive definite, or not finite
+        return _Stacked(prediction, None)
+
+
+class _Minimiser(NamedTuple):
+    """States (N + 1, n) and inputs (N, m) of the linear system, and how sound they are."""
+
+    x: np.ndarray
+    u: np.ndarray
+    status: Status
+    message: str
+
+
 @dataclass(frozen=True, eq=False)
-class BatchProgram(Program):
+class BatchProgram(MethodProgram):
     """A stacked problem.
 
     Attributes:
-        solver: the options.
         lq: the problem as arrays.
+        fixed: the stacked matrices, where neither time nor parameters change them.
     """
 
     solver: Batch
     lq: LinearQuadratic
+    fixed: _Stacked | None
 
     @property
     def prediction(self) -> StackedPrediction:
         """The stacked matrices with the declared parameters."""
-        stacked = self.fixed or self._stack(self.lq.on(self.lq.declared).matrices)
+        stacked = self.fixed or _stacked(
+            self.solver, self.ocp, self.lq.on(self.lq.declared).matrices
+        )
         return stacked.prediction
 
-    @cached_property
-    def fixed(self) -> _Stacked | None:
-        """The stacked matrices, where neither time nor parameters change them."""
-        return None if self.lq.fixed is None else self._stack(self.lq.fixed)
-
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; a guess is not needed."""
-        run = LinearRun.of(self.lq, x0, t0, parameters)
-        numbers = run.numbers
-        stacked = self.fixed or self._stack(numbers.matrices)
-        x, u, status, message = self._solve(stacked, numbers, run.data.x0)
+        numbers = self.lq.on(data)
+        stacked = self.fixed or _stacked(self.solver, self.ocp, numbers.matrices)
+        x, u, status, message = self._minimiser(stacked, numbers, data.x0)
         n, m = x.shape[1], numbers.matrices
         half = recursion.half_slopes(numbers, x, u)
         by_x, by_u = 2.0 * half[:, :n], 2.0 * half[:, n:]
@@ -96,32 +102,20 @@ class BatchProgram(Program):
         costate = stacked.prediction.costates(by_x, by_u, final)
         h_u = by_u + (costate[1:, None] @ m.B)[:, 0]
         finite = status is not Status.DIVERGED and bool(np.isfinite(costate).all())
-        return run.solution(
-            repr(self.solver),
+        return RunResult(
             status=status,
             message=message,
+            t=data.t0 + self.lq.nodes,
             x=x,
             u=u,
             costate=costate if finite else np.zeros_like(x),
             cost=recursion.cost(numbers, x, u, half) if finite else np.inf,
             residual=float(np.abs(h_u).max()) if finite else np.inf,
-            factorisations=1,
+            iterations=1,
+            work=Work(rollouts=1, factorisations=1),
         )
 
-    def _stack(self, matrices: Matrices) -> _Stacked:
-        steps, n, m = matrices.B.shape
-        feedback = np.zeros((steps, m, n))
-        if self.solver.prestabilise:
-            feedback = recursion.stabilising(matrices, self.lq.ocp.name)
-        prediction = StackedPrediction.of(matrices, feedback)
-        try:
-            return _Stacked(prediction, cho_factor(prediction.hessian))
-        except (LinAlgError, ValueError):  # not positive definite, or not finite
-            return _Stacked(prediction, None)
-
-    def _solve(
-        self, stacked: _Stacked, data: LQData, x0: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, Status, str]:
+    def _minimiser(self, stacked: _Stacked, data: LQData, x0: np.ndarray) -> _Minimiser:
         prediction = stacked.prediction
         with np.errstate(over="ignore", invalid="ignore"):
             gradient = prediction.gradient(data, *prediction.nominal(data, x0))
@@ -129,8 +123,9 @@ class BatchProgram(Program):
         said = f"H has the condition number {prediction.condition:.2g}{advice}"
         if stacked.factor is None or not np.isfinite(gradient).all():
             nothing = np.zeros((self.lq.steps, data.r.shape[1]))
-            return np.tile(x0, (len(nothing) + 1, 1)), nothing, Status.DIVERGED, said
+            still = np.tile(x0, (len(nothing) + 1, 1))
+            return _Minimiser(still, nothing, Status.DIVERGED, said)
         x, u = prediction.trajectory(data, x0, -cho_solve(stacked.factor, gradient))
         if prediction.condition > _ILL_CONDITIONED:
-            return x, u, Status.FAILED, said
-        return x, u, Status.SOLVED, ""
+            return _Minimiser(x, u, Status.FAILED, said)
+        return _Minimiser(x, u, Status.SOLVED, "")

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from ocp.internal import LinearQuadratic, LQData, Matrices
 from solvers.linear import regulator_gains as recursion
+from solvers.linear.qp.quadratic_program import QpVectors
 from solvers.linear.stacked_prediction import StackedPrediction
 
 # A point as (x (N + 1, n), u (N, m)).
@@ -20,14 +21,6 @@ class FormPosition(NamedTuple):
     name: str
     node: int
     is_control_bound: bool
-
-
-class FormVectors(NamedTuple):
-    """What changes from run to run: g, and the bounds l and u of the rows."""
-
-    g: np.ndarray
-    l: np.ndarray  # noqa: E741
-    u: np.ndarray
 
 
 class MPCForm(ABC):
@@ -62,7 +55,7 @@ class MPCForm(ABC):
         """Fill H and G."""
 
     @abstractmethod
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
 
     @abstractmethod
@@ -144,21 +137,21 @@ class Sparse(MPCForm):
     def _row_blocks(self, m: Matrices) -> list["_Block"]:
         steps, n = self._after.shape
         on, count = self.lq.on_control, len(self.lq.rows)
-        gap = np.arange(steps * n).reshape(steps, n)
+        defects = np.arange(steps * n).reshape(steps, n)
         first = steps * n + np.arange(int(on.sum()))[None]
         middle = first.size + steps * n + np.arange((steps - 1) * count).reshape(steps - 1, count)
         end = steps * n + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
         return [
-            _Block(gap, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
-            _Block(gap[1:], self._after[:-1], -m.A[1:]),
-            _Block(gap, self._u, -m.B),
+            _Block(defects, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
+            _Block(defects[1:], self._after[:-1], -m.A[1:]),
+            _Block(defects, self._u, -m.B),
             _Block(first, self._u[:1], m.D_u[:1, on]),
             _Block(middle, self._after[:-1], m.D_x[1:]),
             _Block(middle, self._u[1:], m.D_u[1:]),
             _Block(end, self._after[-1:], m.D_f[None]),
         ]
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
         m, on, first = data.matrices, self.lq.on_control, int(self.lq.on_control.sum())
         g = np.empty(self._size)
@@ -166,15 +159,14 @@ class Sparse(MPCForm):
         g[self._u[0]] += 2.0 * (x0 @ m.S[0])
         g[self._after[:-1]] = 2.0 * data.q[1:]
         g[self._after[-1]] = 2.0 * data.p
-        gap = data.c.copy()
-        gap[0] += m.A[0] @ x0
+        defects = data.c.copy()
+        defects[0] += m.A[0] @ x0
         low, high = self._bounds(data)
         known = m.D_x[0, on] @ x0
         low[:first] -= known
         high[:first] -= known
-        return FormVectors(
-            g, np.concatenate([gap.ravel(), low]), np.concatenate([gap.ravel(), high])
-        )
+        rows = defects.ravel()
+        return QpVectors(g, np.concatenate([rows, low]), np.concatenate([rows, high]))
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""
@@ -218,14 +210,14 @@ class Condensed(MPCForm):
         assert self._prediction is not None
         return self._prediction
 
-    def vectors(self, data: LQData, x0: np.ndarray) -> FormVectors:
+    def vectors(self, data: LQData, x0: np.ndarray) -> QpVectors:
         """Return g, l and u."""
         m, on = data.matrices, self.lq.on_control
         z, x_end = self._stacked.nominal(data, x0)
         rows = (m.D @ z[:, :, None])[:, :, 0]
         known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
         low, high = self._bounds(data)
-        return FormVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
+        return QpVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""

@@ -1,18 +1,23 @@
 """Constrained linear optimal control: one quadratic program, solved again and again."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, Status, linear_quadratic
-from ocp.internal import LinearQuadratic, LQData, Matrices, RunData, check_positive, start_violation
+from ocp import OCP, InitialGuess, ProblemError, Solver, Status, Work, linear_quadratic
+from ocp.internal import (
+    LinearQuadratic,
+    LQData,
+    Matrices,
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_positive,
+    start_violation,
+)
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.linear_forms import Condensed, MPCForm, Sparse
-from solvers.linear.linear_run import LinearRun
 from solvers.linear.qp.least_violation import least_violation
 from solvers.linear.qp.qp_backends import QpBackend, QpResult, qp_backend
 from solvers.linear.qp.quadratic_program import QP, Softening
@@ -45,8 +50,8 @@ class LinearMPC(Solver):
         form: ``"sparse"`` keeps the states as unknowns, effort linear in the horizon;
             ``"condensed"`` has inputs only (2.83), pre-stabilised: good for short horizons.
         tolerance: largest accepted residual.
-        soft: price of exceeding a constraint that is not a bound of a control, an exact
-            penalty; it has to exceed the constraints' multipliers. None: hard.
+        soft: weight of an exact penalty on exceeding a constraint that is not a bound of a
+            control; it has to exceed the constraints' multipliers. None: hard.
     """
 
     backend: str = "osqp"
@@ -71,7 +76,7 @@ class LinearMPC(Solver):
             rows = [form.equations + i for i, p in enumerate(form.places) if not p.is_control_bound]
             softening = Softening(np.array(rows, dtype=int), self.soft)
         program = LinearMPCProgram(
-            self, lq, form, qp_backend(self.backend, self.tolerance), softening
+            self, ocp, lq, form, qp_backend(self.backend, self.tolerance), softening
         )
         program.prepare(lq.sample_matrices(lq.declared) if lq.fixed is None else lq.fixed)
         return program
@@ -89,15 +94,23 @@ class _Workspace:
     soft: QP | None = None
 
 
+class _Verdict(NamedTuple):
+    """What is returned of a quadratic program: point z, multipliers y, and how sound they are."""
+
+    z: np.ndarray
+    y: np.ndarray
+    status: Status
+    message: str
+
+
 @dataclass(frozen=True, eq=False)
-class LinearMPCProgram(Program):
+class LinearMPCProgram(MethodProgram):
     """A quadratic program with its backend; one run at a time.
 
     Attributes:
-        solver: the options.
         lq: the problem as arrays.
         form: layout of unknowns and rows.
-        backend: who solves it, with its workspace.
+        backend: solves it, with its workspace.
         softening: which rows are soft.
     """
 
@@ -121,27 +134,19 @@ class LinearMPCProgram(Program):
             w.soft = QP.of(*self.softening.soften(self.form.H, self.form.G))
 
     def quadratic_program(self, data: RunData) -> QP:
-        """Return the (soft) program of a run, for who wants to solve it elsewhere."""
+        """Return the (soft) program of a run, to solve it elsewhere."""
         return self._programs(data.x0, self.lq.on(data))[1]
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, from the last answer unless there is a guess."""
-        run = LinearRun.of(self.lq, x0, t0, parameters)
-        numbers, start = run.numbers, run.data.x0
+        numbers, start = self.lq.on(data), data.x0
         hard, qp = self._programs(start, numbers)
         answer = self.backend.solve(qp, self._warm_start(guess, numbers, qp))
         found = answer.residuals
         z, y, status, message = self._verdict(answer, hard, qp)
         if status is Status.SOLVED and self.softening is None:
             # The program has no row for the start: nothing can be done about it.
-            message = start_violation(self.lq.ocp, run.data)
+            message = start_violation(self.ocp, data)
             status = Status.INFEASIBLE if message else status
         x, u = self.form.trajectory(z, numbers, start)
         half = recursion.half_slopes(numbers, x, u)
@@ -150,17 +155,17 @@ class LinearMPCProgram(Program):
         if not sound:
             x, u = np.tile(start, (self.lq.steps + 1, 1)), np.zeros_like(numbers.r)
             costate, status = np.zeros_like(x), Status.DIVERGED
-        return run.solution(
-            self._name,
+        return RunResult(
             status=status,
             message=message,
+            t=data.t0 + self.lq.nodes,
             x=x,
             u=u,
             costate=costate,
             cost=recursion.cost(numbers, x, u, half) if sound else np.inf,
             residual=max(found),
             iterations=answer.iterations,
-            factorisations=answer.factorisations,
+            work=Work(rollouts=1, factorisations=answer.factorisations),
             history={
                 "primal": np.array([found.primal]),
                 "dual": np.array([found.dual]),
@@ -171,9 +176,9 @@ class LinearMPCProgram(Program):
 
     # -- pieces -----------------------------------------------------------------------------
 
-    @cached_property
-    def _name(self) -> str:
-        return repr(self.solver)
+    def _first_guess(self, given: InitialGuess | None) -> InitialGuess | None:
+        """Only what is given: the answer of the last run is nearer than the problem's guess."""
+        return None if given is None else self.ocp.first_guess(given)
 
     def _programs(self, start: np.ndarray, numbers: LQData) -> tuple[QP, QP]:
         """Return the program with hard constraints, and the one to solve."""
@@ -185,7 +190,7 @@ class LinearMPCProgram(Program):
         hard = w.hard.with_vectors(*vectors)
         if self.softening is None:
             return hard, hard
-        return hard, w.soft.with_vectors(*self.softening.bounds(*vectors))
+        return hard, w.soft.with_vectors(*self.softening.soften_vectors(vectors))
 
     def _warm_start(self, guess: InitialGuess | None, numbers: LQData, qp: QP) -> np.ndarray | None:
         if guess is None:
@@ -198,31 +203,29 @@ class LinearMPCProgram(Program):
         z = self.form.point(x, u, numbers)
         return np.concatenate([z, np.zeros(len(qp.g) - len(z))])
 
-    def _verdict(
-        self, answer: QpResult, hard: QP, qp: QP
-    ) -> tuple[np.ndarray, np.ndarray, Status, str]:
-        """Return point, multipliers, status and message."""
+    def _verdict(self, answer: QpResult, hard: QP, qp: QP) -> _Verdict:
+        """Judge an answer by its residuals; without a good one, look for what cannot be met."""
         size, rows, found = len(hard.g), len(hard.l), answer.residuals
         if answer.z is not None and answer.y is not None and max(found) <= self.solver.tolerance:
             y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
-            return answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:])
+            return _Verdict(answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:]))
         elastic = self._elastic_rows()
         point, excess = least_violation(qp if self.softening else hard, elastic, rows)
         if excess.max(initial=0.0) > _UNAVOIDABLE:
             worst = int(excess.argmax())
             said = f"{self._where(worst)} cannot be met, it is exceeded by {excess[worst]:.3g}"
-            return point[:size], np.zeros(rows), Status.INFEASIBLE, said
+            return _Verdict(point[:size], np.zeros(rows), Status.INFEASIBLE, said)
         said = (
             f"{self.solver.backend} says '{answer.word}'; residuals: primal {found.primal:.2g}, "
             f"dual {found.dual:.2g}, gap {found.gap:.2g}"
         )
         if answer.z is None or answer.y is None:
-            return point[:size], np.zeros(rows), Status.FAILED, said
+            return _Verdict(point[:size], np.zeros(rows), Status.FAILED, said)
         y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
-        return answer.z[:size], y, Status.ITERATION_LIMIT, said
+        return _Verdict(answer.z[:size], y, Status.ITERATION_LIMIT, said)
 
     def _elastic_rows(self) -> np.ndarray:
-        """Rows that give way in the search for the cause: all but dynamics and control bounds."""
+        """Rows that are relaxed to find the cause: all but dynamics and control bounds."""
         rows = [self.form.equations + i for i, p in enumerate(self.form.places)
                 if not p.is_control_bound]  # fmt: skip
         return np.array(rows, dtype=int)

@@ -1,4 +1,4 @@
-"""Riccati's recursion on stacked matrices, and what all linear solvers make of its arrays."""
+"""Riccati's recursion on stacked matrices, and what all linear solvers compute from arrays."""
 
 from dataclasses import dataclass
 

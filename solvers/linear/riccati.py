@@ -1,26 +1,23 @@
 """Dynamic programming for linear-quadratic problems: Riccati's recursion."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
     InitialGuess,
     ProblemError,
-    Program,
-    Solution,
     Solver,
+    Status,
+    Work,
     linear_quadratic,
     with_stationary_end,
 )
-from ocp.internal import LinearQuadratic
+from ocp.internal import LinearQuadratic, MethodProgram, RunData, RunResult
 from solvers.linear import regulator_gains as recursion
-from solvers.linear.linear_run import LinearRun
 
 
 @dataclass(frozen=True)
@@ -53,23 +50,22 @@ class Riccati(Solver):
         problem = with_stationary_end(ocp) if self.horizon == "infinite" else ocp
         lq = linear_quadratic(problem)
         recursion.refuse_constraints(lq, "Riccati")
-        program = RiccatiProgram(self, lq)
-        if lq.fixed is not None:
-            _ = program.fixed_gains
-        return program
+        fixed = None if lq.fixed is None else recursion.regulator_gains(lq.fixed)
+        return RiccatiProgram(self, lq.ocp, lq, fixed)
 
 
 @dataclass(frozen=True, eq=False)
-class RiccatiProgram(Program):
+class RiccatiProgram(MethodProgram):
     """A problem whose gains are known.
 
     Attributes:
-        solver: the options.
         lq: the problem as arrays.
+        fixed_gains: the gains, where neither time nor parameters change them.
     """
 
     solver: Riccati
     lq: LinearQuadratic
+    fixed_gains: recursion.RegulatorGains | None
 
     @property
     def P(self) -> np.ndarray:
@@ -87,34 +83,23 @@ class RiccatiProgram(Program):
         return recursion.affine_parts(self._declared, self.lq.on(self.lq.declared))[1]
 
     @cached_property
-    def fixed_gains(self) -> recursion.RegulatorGains | None:
-        """The gains, where neither time nor parameters change them."""
-        return None if self.lq.fixed is None else recursion.regulator_gains(self.lq.fixed)
-
-    @cached_property
     def _declared(self) -> recursion.RegulatorGains:
         return self.fixed_gains or recursion.regulator_gains(self.lq.on(self.lq.declared).matrices)
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; a guess is not needed."""
-        run = LinearRun.of(self.lq, x0, t0, parameters)
-        numbers = run.numbers
+        numbers = self.lq.on(data)
         gains = self.fixed_gains or recursion.regulator_gains(numbers.matrices)
         p, k = recursion.affine_parts(gains, numbers)
-        x, u = recursion.closed_loop_rollout(numbers, run.data.x0, gains.K, -k)
+        x, u = recursion.closed_loop_rollout(numbers, data.x0, gains.K, -k)
         half = recursion.half_slopes(numbers, x, u)
-        return run.solution(
-            repr(self.solver),
+        return RunResult(
+            status=Status.SOLVED,
+            t=data.t0 + self.lq.nodes,
             x=x,
             u=u,
             costate=2.0 * (np.einsum("kij,kj->ki", gains.P, x) + p),
             cost=recursion.cost(numbers, x, u, half),
-            factorisations=self.lq.steps,
+            iterations=1,
+            work=Work(rollouts=1, factorisations=self.lq.steps),
         )

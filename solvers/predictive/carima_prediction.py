@@ -1,4 +1,4 @@
-"""What a CARIMA model will do: free response of the past, forced response of the future."""
+"""Prediction with a CARIMA model: free response of the past, forced response of the future."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -123,6 +124,14 @@ class ControlMove:
     outputs: np.ndarray
 
 
+class _Plan(NamedTuple):
+    """Increments (Nu,) of the quadratic program, and how sound they are."""
+
+    increments: np.ndarray
+    status: Status
+    message: str
+
+
 @dataclass(frozen=True, eq=False)
 class GPCLaw:
     """The law for one plant.
@@ -174,11 +183,12 @@ class GPCLaw:
         free, last = p.free(outputs, inputs), float(history(inputs, "inputs")[-1])
         miss = self._reference(reference) - free
         plan = self.gains @ miss
-        rows, lower, upper = self._rows(free, last)
-        slack = _MET * (1.0 + np.abs(rows @ plan))
+        lower, upper = self._bounds(free, last)
+        rows = self._matrix @ plan
+        slack = _MET * (1.0 + np.abs(rows))
         status, message = Status.SOLVED, ""
-        if np.any(rows @ plan < lower - slack) or np.any(rows @ plan > upper + slack):
-            plan, status, message = self._constrained(miss, rows, lower, upper)
+        if np.any(rows < lower - slack) or np.any(rows > upper + slack):
+            plan, status, message = self._constrained(miss, lower, upper)
         if status is Status.SOLVED:
             # Rounding must not leave the bounds of what is applied.
             low, high = self._first(last)
@@ -222,13 +232,13 @@ class GPCLaw:
         low = max(np.asarray(du.lower)[0], np.asarray(u.lower)[0] - last)
         return low, min(np.asarray(du.upper)[0], np.asarray(u.upper)[0] - last)
 
-    def _rows(self, free: np.ndarray, last: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Matrix and bounds: increments, inputs and outputs, one row each."""
+    def _bounds(self, free: np.ndarray, last: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the rows of ``_matrix``."""
         lower, upper = [], []
         for (_, box), shift in zip(self._blocks, (0.0, last, free), strict=True):
             lower.append(np.asarray(box.lower) - shift + np.zeros(self._counts[len(lower)]))
             upper.append(np.asarray(box.upper) - shift + np.zeros(self._counts[len(upper)]))
-        return self._matrix, np.concatenate(lower), np.concatenate(upper)
+        return np.concatenate(lower), np.concatenate(upper)
 
     @property
     def _blocks(self) -> tuple[tuple[str, Box], ...]:
@@ -246,6 +256,7 @@ class GPCLaw:
 
     @cached_property
     def _matrix(self) -> np.ndarray:
+        """Increments, inputs and outputs for a plan, one row each."""
         nu = self.prediction.nu
         return np.vstack([np.eye(nu), np.tri(nu), self.prediction.forced])
 
@@ -253,20 +264,20 @@ class GPCLaw:
     def _program(self) -> QP:
         return QP.of(sp.csc_matrix(2.0 * self._half_hessian), sp.csc_matrix(self._matrix))
 
-    def _constrained(
-        self, miss: np.ndarray, rows: np.ndarray, lower: np.ndarray, upper: np.ndarray
-    ) -> tuple[np.ndarray, Status, str]:
-        qp = self._program.with_vectors(-2.0 * self.prediction.forced.T @ miss, lower, upper)
+    def _constrained(self, miss: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> _Plan:
+        gradient = -2.0 * self.prediction.forced.T @ miss
+        qp = self._program.with_vectors(gradient, lower, upper)
         answer = self.backend.solve(qp)
         if answer.z is not None and max(answer.residuals) <= self.options.tolerance:
-            return answer.z, Status.SOLVED, ""
+            return _Plan(answer.z, Status.SOLVED, "")
         still = np.zeros(self.prediction.nu)
         nu = self.prediction.nu
-        _, excess = least_violation(qp, np.arange(2 * nu, len(rows)), len(rows))
+        _, excess = least_violation(qp, np.arange(2 * nu, len(lower)), len(lower))
         if excess.max() > _UNAVOIDABLE:
             name = self._name(int(excess.argmax()))
-            return still, Status.INFEASIBLE, f"{name} must be exceeded by {excess.max():.3g}"
-        return still, Status.FAILED, f"{self.options.backend} says {answer.word}"
+            said = f"{name} must be exceeded by {excess.max():.3g}"
+            return _Plan(still, Status.INFEASIBLE, said)
+        return _Plan(still, Status.FAILED, f"{self.options.backend} says {answer.word}")
 
     def _name(self, row: int) -> str:
         for (name, _), count in zip(self._blocks, self._counts, strict=True):

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
-from ocp import OCP, Integrator, Signal
-from ocp.internal import ConstraintRows, RunData, Stage
-from solvers.tabular.columns import Columns
+from ocp import OCP
+from ocp.internal import ConstraintRows, RunData
+from solvers.tabular.grid_functions import GridFunctions
 from solvers.tabular.state_grid import StateGrid
 
 # A bound or constraint counts as met within this, relative to 1 + abs(bound): rounding only.
@@ -78,7 +77,7 @@ class Bellman:
         grid: the points of the states.
         controls: the controls that are tried.
         n: number of steps.
-        integrator: one-step method of a continuous model.
+        functions: of a step, and of the last node.
         slack: by how much a terminal constraint may be missed.
     """
 
@@ -86,7 +85,7 @@ class Bellman:
     grid: StateGrid
     controls: StateGrid
     n: int
-    integrator: Integrator
+    functions: GridFunctions
     slack: float
 
     # -- the recursion --------------------------------------------------------------------
@@ -98,13 +97,13 @@ class Bellman:
         policy = np.empty((self.n, self.grid.size, self.ocp.model.nu))
         value[-1] = self.final(data)
         x, u = self._all_pairs()
-        moves, pays = self._varies
+        f = self.functions
         after, cost = self.step(x, u, common[-1], first=False)
         matrix, inside = self.grid.interpolation(after)
         for k in reversed(range(self.n)):
-            if k < self.n - 1 and (moves or pays):
+            if k < self.n - 1 and (f.state_varies or f.cost_varies):
                 after, cost = self.step(x, u, common[k], first=False)
-            if k < self.n - 1 and moves:
+            if k < self.n - 1 and f.state_varies:
                 matrix, inside = self.grid.interpolation(after)
             cost[~inside] = np.inf
             total = (matrix @ value[k + 1] + cost).reshape(self.grid.size, -1)
@@ -115,10 +114,10 @@ class Bellman:
         """Return the cost of the last node on the terminal set, inf outside it (2.30, 2.31)."""
         x, p = self.grid.points, data.values.at(1.0)[0]
         t = np.array([data.t0 + self.ocp.duration])
-        cost = self._terminal_cost([x], [t, p])[:, 0]
+        cost = self.functions.terminal_cost([x], [t, p])[:, 0]
         met = self._in_state_bounds(x)
-        met &= _met(self._last([x], [t, p]), self._without_control)
-        met &= _met(self._terminal([x], [t, p]), self.ocp.rows.terminal, self.slack)
+        met &= _met(self.functions.last([x], [t, p]), self.functions.without_control)
+        met &= _met(self.functions.terminal([x], [t, p]), self.ocp.rows.terminal, self.slack)
         return np.where(met & np.isfinite(cost), cost, np.inf)
 
     def minimum(self, total: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -162,8 +161,8 @@ class Bellman:
             common: t, h, p0 and p1 of the step.
             first: whether x is the start: what it alone decides is then not imposed.
         """
-        stepped = self._step([x, u], common)
-        path = self._path([x, u], [common[0], common[2]])
+        stepped = self.functions.step([x, u], common)
+        path = self.functions.path([x, u], [common[0], common[2]])
         rows = self.ocp.rows.path
         counted = rows.on_control | (not first)
         met = _met(path[:, counted], rows.where(counted))
@@ -184,77 +183,15 @@ class Bellman:
     def _in_state_bounds(self, x: np.ndarray) -> np.ndarray:
         return _met(x, self.ocp.rows.states)
 
-    # -- functions, built once --------------------------------------------------------------
-
-    def prepare(self) -> "Bellman":
-        """Build every Function now, and return self."""
-        _ = self._step, self._varies, self._path, self._last, self._terminal, self._terminal_cost
-        return self
-
-    @cached_property
-    def _stage(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
-        """Symbols of a step, and state and cost after it."""
-        step = Stage.of(self.ocp, self.integrator, held=True).step
-        symbols = [ca.SX.sym(step.name_in(i), *step.size_in(i)) for i in range(step.n_in())]
-        after, cost = step(*symbols)
-        return symbols, after, cost
-
-    @cached_property
-    def _varies(self) -> tuple[bool, bool]:
-        """Whether the next state, and cost or constraints, depend on time or on a signal."""
-        entries = self.ocp.parameters
-        moving = [isinstance(e, Signal) for e in entries for _ in range(e.symbol.numel())]
-        kept = np.flatnonzero(moving).tolist()
-        (_, _, t, _, p0, p1), after, cost = self._stage
-        timely = ca.vertcat(t, p0[kept], p1[kept]) if kept else t
-        m = self.ocp.model
-        timely_path = ca.vertcat(m.t, self.ocp.p[kept]) if kept else m.t
-        path = self.ocp.rows.path.expression
-        on_path = path.numel() > 0 and ca.depends_on(path, timely_path)
-        return ca.depends_on(after, timely), ca.depends_on(cost, timely) or on_path
-
-    @cached_property
-    def _step(self) -> Columns:
-        symbols, after, cost = self._stage
-        return Columns(ca.Function("step", symbols, [ca.densify(ca.vertcat(after, cost))]), 2)
-
-    @cached_property
-    def _path(self) -> Columns:
-        m = self.ocp.model
-        path = ca.densify(self.ocp.rows.path.expression)
-        return Columns(ca.Function("path", [m.x, m.u, m.t, self.ocp.p], [path]), 2)
-
-    @cached_property
-    def _without_control(self) -> ConstraintRows:
-        """The path constraints without a control: they hold at the last node too."""
-        path = self.ocp.rows.path
-        return path.where(~path.on_control)
-
-    @cached_property
-    def _last(self) -> Columns:
-        return self._at_end("last", self._without_control.expression)
-
-    @cached_property
-    def _terminal(self) -> Columns:
-        return self._at_end("terminal", self.ocp.rows.terminal.expression)
-
-    @cached_property
-    def _terminal_cost(self) -> Columns:
-        return self._at_end("terminal_cost", ca.SX(self.ocp.terminal_cost))
-
-    def _at_end(self, name: str, column: ca.SX) -> Columns:
-        m = self.ocp.model
-        return Columns(ca.Function(name, [m.x, m.t, self.ocp.p], [ca.densify(column)]), 1)
-
 
 def _vertex(
     left: np.ndarray, middle: np.ndarray, right: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where the parabola through -1, 0 and 1 is least, and by how much below the middle."""
-    bend, tilt = left - 2.0 * middle + right, (right - left) / 2.0
-    curved = bend > 0.0
-    shift = np.divide(-tilt, bend, out=np.zeros_like(bend), where=curved)
-    return shift, 0.5 * bend * shift**2
+    curvature, slope = left - 2.0 * middle + right, (right - left) / 2.0
+    convex = curvature > 0.0
+    shift = np.divide(-slope, curvature, out=np.zeros_like(curvature), where=convex)
+    return shift, 0.5 * curvature * shift**2
 
 
 def _met(values: np.ndarray, rows: ConstraintRows, slack: float = 0.0) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A CasADi Function at very many points at once, without copies through CasADi's matrices."""
+"""A CasADi Function at very many points at once, without copies into CasADi's matrices."""
 
 from dataclasses import dataclass, field
 

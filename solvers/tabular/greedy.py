@@ -1,16 +1,21 @@
 """Greedy control: at every step the input that is best for that step alone."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Program, Solution, Solver, Status, Work
-from ocp.internal import RunData, Stage, check_instance, check_positive, check_whole
+from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, Work
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    Stage,
+    check_instance,
+    check_positive,
+    check_whole,
+)
 from solvers.tabular.one_step import OneStep, one_step
 from solvers.tabular.refusal import refuse_free_ends
 
@@ -100,12 +105,10 @@ class _Walk:
 
 
 @dataclass(frozen=True, eq=False)
-class GreedyProgram(Program):
+class GreedyProgram(MethodProgram):
     """The problem of a step, built once.
 
     Attributes:
-        solver: the options.
-        ocp: the problem.
         n: number of steps.
         step: state and cost after one.
         sweep: costates along the whole trajectory.
@@ -114,45 +117,29 @@ class GreedyProgram(Program):
     """
 
     solver: Greedy
-    ocp: OCP
     n: int
     step: ca.Function
     sweep: ca.Function
     inner: OneStep
     last: OneStep
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Go from step to step; of a guess only the first control is used."""
-        started = perf_counter()
         ocp, n, m = self.ocp, self.n, self.ocp.model
-        data = RunData.of(ocp, x0, t0, parameters)
         nodes = np.linspace(0.0, 1.0, n + 1)
-        guess = ocp.first_guess(guess)
         first = guess.sample("u", nodes[:1], m.nu) if guess else None
         u = ocp.control_bounds.clip(np.zeros(m.nu) if first is None else first[0])
         walk = self._walk(data, nodes, u)
-        return Solution(
-            problem=ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=walk.status,
             message=walk.message,
-            t=t0 + nodes * ocp.duration,
+            t=data.t0 + nodes * ocp.duration,
             x=np.array(walk.x),
-            x0=data.x0,
             costate=self._costates(walk, data, nodes),
             u=np.array(walk.u),
             cost=walk.cost,
             iterations=walk.iterations,
             work=Work(rollouts=1, jacobians=1, factorisations=walk.iterations),
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
     def _walk(self, data: RunData, nodes: np.ndarray, u: np.ndarray) -> _Walk:
@@ -179,14 +166,17 @@ class GreedyProgram(Program):
 
     def _choose(self, walk: _Walk, k: int, u: np.ndarray, here: np.ndarray, t: float) -> np.ndarray:
         problem = self.last if k == self.n - 1 else self.inner
-        found, broken, stats = problem.solve(u, here, self.ocp.control_bounds)
-        walk.iterations += int(stats.get("iter_count", 0))
-        if broken or not stats.get("success"):
-            word = str(stats.get("return_status", ""))
-            walk.status = _status(broken, word)
-            why = f"no control keeps {broken}" if broken else f"the backend says {word}"
+        found = problem.solve(u, here, self.ocp.control_bounds)
+        walk.iterations += found.iterations
+        if found.broken or not found.success:
+            walk.status = _status(found.broken, found.word)
+            why = (
+                f"no control keeps {found.broken}"
+                if found.broken
+                else f"the backend says {found.word}"
+            )
             walk.message = f"step {k}, t = {t:.4g} s: {why}; the control is held from there"
-        return found
+        return found.u
 
     def _blown_up(self, walk: _Walk, u: np.ndarray, t: float) -> _Walk:
         rest = self.n - len(walk.u)

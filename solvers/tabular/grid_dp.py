@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +13,21 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Program,
-    Solution,
     Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
-from ocp.internal import RunData, check_instance, check_not_negative, check_whole
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_not_negative,
+    check_whole,
+)
 from solvers.tabular.bellman import Bellman, ValueFunction
+from solvers.tabular.grid_functions import GridFunctions
 from solvers.tabular.policy_run import PolicyRun, follow_policy
 from solvers.tabular.refusal import refuse_free_ends
 from solvers.tabular.state_grid import Axis, StateGrid
@@ -94,10 +99,11 @@ class GridDP(Solver):
         controls = _grid(self.controls, ocp.control_bounds, m.u_names, "controls")
         self._check_memory(ocp, states, controls)
         n = ocp.steps or self.intervals
-        fine = Bellman(ocp, states, controls, n, self.integrator, self.terminal_slack)
+        functions = GridFunctions.of(ocp, self.integrator)
+        fine = Bellman(ocp, states, controls, n, functions, self.terminal_slack)
         half = replace(fine, grid=states.coarser, controls=controls.coarser)
         quarter = replace(fine, grid=half.grid.coarser, controls=half.controls.coarser)
-        return GridDPProgram(self, ocp, tuple(b.prepare() for b in (quarter, half, fine)))
+        return GridDPProgram(self, ocp, (quarter, half, fine))
 
     def _refuse_equations(self, ocp: OCP) -> None:
         for c in (*ocp.at("path"), *ocp.at("terminal")):
@@ -161,17 +167,14 @@ def _axis(axis: int | Axis, lower: float, upper: float, what: str) -> Axis:
 
 
 @dataclass(frozen=True, eq=False)
-class GridDPProgram(Program):
+class GridDPProgram(MethodProgram):
     """A problem on its grid; tables are kept as long as time and parameters stay the same.
 
     Attributes:
-        solver: the options.
-        ocp: the problem.
         levels: the recursion with a quarter of the points, with half, and with all.
     """
 
     solver: GridDP
-    ocp: OCP
     levels: tuple[Bellman, ...]
     _kept: dict[str, tuple[bytes, tuple[ValueFunction, ...]]] = field(
         default_factory=dict, repr=False
@@ -188,17 +191,8 @@ class GridDPProgram(Program):
         """Return value function, policy and reachable sets for these data."""
         return self._tables(RunData.of(self.ocp, t0=t0, parameters=parameters))[-1]
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Fill the table, unless it is the last one, and follow its policy; no guess is used."""
-        started = perf_counter()
-        data = RunData.of(self.ocp, x0, t0, parameters)
         for value, axis, name in zip(data.x0, self.grid.axes, self.ocp.model.x_names, strict=True):
             if not axis.lower <= value <= axis.upper:
                 raise ProblemError(
@@ -213,14 +207,11 @@ class GridDPProgram(Program):
         work = sum(b.controls.size for b in self.levels)
         if self._kept.get("tables") is not before:
             work += sum(b.pairs for b in self.levels)
-        return Solution(
-            problem=self.ocp,
-            solver=repr(self.solver),
+        return RunResult(
             status=status,
             message=message,
             t=tables[-1].t,
             x=run.x,
-            x0=data.x0,
             costate=self._costates(tables[-1], run, data),
             u=run.u,
             cost=run.cost,
@@ -228,8 +219,6 @@ class GridDPProgram(Program):
             iterations=1,
             work=Work(rollouts=work),
             history={"value": np.array([r.expected for r in runs])},
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
     def _tables(self, data: RunData) -> tuple[ValueFunction, ...]:

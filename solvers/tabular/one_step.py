@@ -1,7 +1,7 @@
-"""The problem of one step: the best input for it, and the constraints of where it leads."""
+"""The problem of one step of greedy control: its best input, within the constraints after it."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -11,6 +11,24 @@ from ocp.internal import ConstraintRows, Stage
 
 # Beyond this a constraint counts as violated, whatever the backend says.
 _VIOLATED = 1e-6
+
+
+class StepControl(NamedTuple):
+    """The control of one step.
+
+    Attributes:
+        u: control (nu,), within its bounds.
+        broken: which constraint it breaks, and by how much; empty if none.
+        success: whether the backend says so.
+        word: how the backend says that it ended.
+        iterations: of the backend.
+    """
+
+    u: np.ndarray
+    broken: str
+    success: bool
+    word: str
+    iterations: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +45,8 @@ class OneStep:
     values: ca.Function
     rows: ConstraintRows
 
-    def solve(
-        self, u: np.ndarray, data: np.ndarray, box: Box
-    ) -> tuple[np.ndarray, str, dict[str, Any]]:
-        """Return the control, which constraint it breaks (or nothing), and the statistics."""
+    def solve(self, u: np.ndarray, data: np.ndarray, box: Box) -> StepControl:
+        """Return the best control of a step, from a first guess of it."""
         limits = {"lbx": np.asarray(box.lower), "ubx": np.asarray(box.upper)}
         rows = self.rows.box
         limits |= {"lbg": np.asarray(rows.lower), "ubg": np.asarray(rows.upper)}
@@ -38,12 +54,17 @@ class OneStep:
         found = np.array(answer["x"]).ravel()
         g = np.array(self.values(found, data)).ravel()
         stats = self.nlp.stats()
+        ended = (
+            bool(stats.get("success")),
+            str(stats.get("return_status", "")),
+            int(stats.get("iter_count", 0)),
+        )
         if not np.isfinite(found).all() or not np.isfinite(g).all():
-            return box.clip(u), "a number that is not finite", stats
+            return StepControl(box.clip(u), "a number that is not finite", *ended)
         worst = self.rows.largest_violation(g[None, :], np.zeros(1))
         if worst.amount > _VIOLATED * (1.0 + np.abs(g).max(initial=0.0)):
-            return box.clip(found), f"{worst.row} by {worst.amount:.3g}", stats
-        return box.clip(found), "", stats
+            return StepControl(box.clip(found), f"{worst.row} by {worst.amount:.3g}", *ended)
+        return StepControl(box.clip(found), "", *ended)
 
 
 def one_step(ocp: OCP, stage: Stage, options: dict[str, Any], *, last: bool) -> OneStep:

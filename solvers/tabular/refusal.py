@@ -1,4 +1,4 @@
-"""What methods that go forward step by step from a given start cannot treat."""
+"""Refusal of free starts and durations by methods that go step by step from a given start."""
 
 from ocp import OCP, UnsupportedProblem
 

@@ -85,7 +85,7 @@ class StateGrid:
         return StateGrid(tuple(a.coarser for a in self.axes))
 
     def interpolation(self, x: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
-        """Return multilinear interpolation at x (n, dimensions) as a matrix, and who is inside.
+        """Return multilinear interpolation at x (n, dimensions) as a matrix, and a mask.
 
         Weights that are 0 are not stored: a value at a corner then matters only where it has
         a weight, so that ``matrix @ value`` is inf exactly in the cells with an infinite corner.
@@ -129,7 +129,7 @@ class StateGrid:
         return np.stack(result, axis=1)
 
     def _locate(self, x: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-        """Who is inside, the cell along each axis, and the position in it from 0 to 1."""
+        """Which points are inside, the cell along each axis, and the position in it from 0 to 1."""
         inside, cells, parts = np.ones(len(x), dtype=bool), [], []
         for i, axis in enumerate(self.axes):
             position = (x[:, i] - axis.lower) / axis.step

@@ -80,7 +80,7 @@ def test_closed_forms(build, optimum, kind):
 
 def test_the_jacobian_of_the_equations():
     answer, arcs = fewest(double_integrator_bounded_energy())
-    shooting = ArcShooting(ArcConditions(answer, arcs), nodes=2, steps=4)
+    shooting = ArcShooting(ArcConditions.of(answer, arcs), nodes=2, steps=4)
     value, slope = shooting.system
     w = shooting.guess()
     assert value.numel_out(0) == len(w)
@@ -96,7 +96,7 @@ def test_the_jacobian_of_the_equations():
 def test_arcs_in_the_wrong_order_are_no_extremal():
     answer, (push, brake) = fewest(double_integrator_minimum_time())
     wrong = (Arc(0.0, 0.5, brake.laws), Arc(0.5, 1.0, push.laws))
-    shooting = ArcShooting(ArcConditions(answer, wrong))
+    shooting = ArcShooting(ArcConditions.of(answer, wrong))
     found = shooting.solve(shooting.guess(), 1e-10)
     lengths = found.x[-4:-2]
     assert not found.converged or lengths.min() < 0.0
@@ -104,7 +104,7 @@ def test_arcs_in_the_wrong_order_are_no_extremal():
 
 def test_a_multiplier_of_the_wrong_sign_is_seen():
     answer, arcs = fewest(double_integrator_minimum_time())
-    shooting = ArcShooting(ArcConditions(answer, arcs))
+    shooting = ArcShooting(ArcConditions.of(answer, arcs))
     trajectory = shooting.trajectory(shooting.solve(shooting.guess(), 1e-10).x)
     assert shooting.wrong_signs(trajectory) <= 1e-12
     turned = trajectory.with_(costate=-trajectory.costate)
@@ -116,7 +116,7 @@ def test_what_is_not_said_is_said():
         by_arcs(collocated(double_integrator_energy()))
     answer, arcs = fewest(turnpike())
     with pytest.raises(NoArcsError, match="not quadratic in u"):
-        ArcConditions(answer, arcs)
+        ArcConditions.of(answer, arcs)
 
 
 def two_pushes(bounds: Box, *path: Constraint, x: ca.SX, u: ca.SX) -> OCP:
@@ -193,10 +193,10 @@ def test_signals_and_free_starts_are_refused():
     }
     signal = Signal("w", ca.SX.sym("w"), np.zeros(3))
     followed = answer.with_(problem=OCP(name="w", parameters=(signal,), **parts))
-    for refusing in (ArcConditions, TimeScaledProblem):
+    for refusing in (ArcConditions.of, TimeScaledProblem):
         with pytest.raises(NoArcsError, match="signals"):
             refusing(followed, arcs)
     start = Constraint("start", ocp.model.x, 0.0, 0.0, at="initial")
     free = answer.with_(problem=OCP(name="free", constraints=(start,), **parts))
     with pytest.raises(NoArcsError, match="start is free"):
-        ArcConditions(free, arcs)
+        ArcConditions.of(free, arcs)

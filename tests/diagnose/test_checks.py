@@ -361,7 +361,7 @@ def test_conflict_of_a_line():
         box=(np.full(2, -np.inf), np.full(2, np.inf)),
     )
     answer = elastic.solve(np.zeros(2), np.empty(0), range(3))
-    assert answer.stretch.sum() == pytest.approx(1.0, abs=ELASTIC)
+    assert answer.slack.sum() == pytest.approx(1.0, abs=ELASTIC)
     assert elastic.conflict(answer, np.empty(0)) == (0, 2)
     assert elastic.is_possible(elastic.solve(np.zeros(2), np.empty(0), (0, 1)))
 

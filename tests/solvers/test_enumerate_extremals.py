@@ -46,7 +46,7 @@ def test_a_free_start_has_minima_and_maxima_in_turn() -> None:
 def test_the_scan_is_the_same_every_time_and_fine_where_it_says_so() -> None:
     one, other = (enumerate_extremals(bare(), keep=1) for _ in range(2))
     np.testing.assert_array_equal(one.scans[0].starts, other.scans[0].starts)
-    assert one.scans[0].gaps.max() <= 0.3
+    assert one.scans[0].distances.max() <= 0.3
 
 
 def test_few_points_are_admitted() -> None:
@@ -100,8 +100,8 @@ def test_refuses_what_it_cannot_enumerate() -> None:
         enumerate_extremals(ended)
     with pytest.raises(ProblemError, match="the start misses 'task error'"):
         enumerate_extremals(ocp, x0=[1.0, -1.5, -1.6])
-    with pytest.raises(ProblemError, match="gap"):
-        enumerate_extremals(ocp, gap=0.0)
+    with pytest.raises(ProblemError, match="spacing"):
+        enumerate_extremals(ocp, spacing=0.0)
     with pytest.raises(ProblemError, match="keep"):
         enumerate_extremals(ocp, keep=0)
 

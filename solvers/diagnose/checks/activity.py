@@ -12,7 +12,7 @@ _SAME = 1e-5
 
 
 def activity(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """Look at the bounds that are active along the trial."""
+    """Check which bounds are active along the trial."""
     if not subject.trial.status.is_success:
         return
     yield from _idle(subject)
@@ -21,7 +21,7 @@ def activity(subject: DiagnosedProblem) -> Iterator[Finding]:
 
 
 def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """An optimum that is the control nobody chose: zero, or the bound next to it."""
+    """An optimum where a control is constant: zero, or the bound next to it."""
     ocp, u = subject.ocp, subject.trial.u
     nothing = ocp.control_bounds.clip(np.zeros_like(u))
     at_end = bool(ocp.at("terminal"))

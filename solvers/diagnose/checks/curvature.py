@@ -1,4 +1,4 @@
-"""How the cost bends: in which control it has no minimum, in which state it flees."""
+"""Second derivatives of the costs: controls without a minimum, states driven away."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ _NEGATIVE = 1e-9
 
 
 def curvature(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """Look at the second derivatives of the costs."""
+    """Check the second derivatives of the costs."""
     yield from _linear(subject)
     yield from _concave_control(subject)
     yield from _concave_state(subject)
@@ -102,8 +102,8 @@ def _concave_state(subject: DiagnosedProblem) -> Iterator[Finding]:
     points = subject.along + subject.around
     for what, cost in (("running", ocp.running_cost), ("terminal", ocp.terminal_cost)):
         gradient = ca.gradient(ca.SX(cost), m.x)
-        bends = ca.vertcat(*[ca.jacobian(gradient[i], m.x[i]) for i in range(m.nx)])
-        values = points.evaluate(ocp, bends)
+        diagonal = ca.vertcat(*[ca.jacobian(gradient[i], m.x[i]) for i in range(m.nx)])
+        values = points.evaluate(ocp, diagonal)
         values = values[np.isfinite(values).all(axis=1)]
         scale = np.abs(values).max(initial=0.0)
         if not scale > 0.0:

@@ -10,7 +10,7 @@ from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.graph import depends, operations
 from solvers.diagnose.subject import DiagnosedProblem
 
-# Nobody turns by ten radians on purpose and in round numbers.
+# Larger angles in round numbers are hardly meant as radians.
 _LEAST, _ROUND, _ROUNDING = 10.0, 5.0, 1e-9
 
 

@@ -14,7 +14,7 @@ _ENDLESS = 20.0
 
 
 def free_time(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """Look at the duration with which the trial ended."""
+    """Check the duration with which the trial ended."""
     horizon = subject.ocp.horizon
     if not isinstance(horizon, FreeTime):
         return

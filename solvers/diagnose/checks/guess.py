@@ -1,4 +1,4 @@
-"""A guess that the bounds throw away."""
+"""A guess that lies outside the bounds."""
 
 from collections.abc import Iterator
 

@@ -26,13 +26,13 @@ def infeasible(subject: DiagnosedProblem) -> Iterator[Finding]:
         return
     # A coarse grid is quick, but may jump over what a finer one cannot.
     for on in dict.fromkeys((subject.coarse, subject)):
-        found = _stretched(on, subject.trial)
+        found = _with_more_time(on, subject.trial)
         if found is not None:
             yield found
             return
 
 
-def _stretched(subject: DiagnosedProblem, trial: Solution) -> Finding | None:
+def _with_more_time(subject: DiagnosedProblem, trial: Solution) -> Finding | None:
     """Return what is in conflict on this grid; None if everything can be met."""
     elastic, nodes = along(subject)
     tr, p = subject.program.transcription, subject.program.transcription.data_vector(subject.data)
@@ -110,7 +110,7 @@ def _finding(
 ) -> Finding:
     demands = [elastic.demands[i] for i in members]
     worst = max(members, key=lambda i: elastic.excess(answer)[i])
-    demand, amount = elastic.demands[worst], float(answer.stretch[worst])
+    demand, amount = elastic.demands[worst], float(answer.slack[worst])
     mine = elastic.owner == worst
     row = int(np.flatnonzero(mine)[answer.weight[mine].argmax()])
     t = float(subject.data.t0 + nodes[row] / nodes.max(initial=1) * duration)
@@ -142,11 +142,11 @@ def _finding(
 def _alone(
     elastic: ElasticProgram, answer: ElasticSolution, members: tuple[int, ...], p: np.ndarray
 ) -> Iterator[str]:
-    """Yield, for each demand in conflict, by how much it alone would have to give way."""
+    """Yield, for each demand in conflict, its violation where it alone has slack."""
     everything = range(len(elastic.demands))
     for i in members if len(members) > 1 else ():
         demand: Demand = elastic.demands[i]
         single = elastic.solve(answer.w, p, everything, soft=[i])
         if single.found:
-            by = f"{single.stretch[i]:.3g} {demand.unit}".rstrip()
+            by = f"{single.slack[i]:.3g} {demand.unit}".rstrip()
             yield f"Alone, {demand.label} would have to give way by {by}."

@@ -36,7 +36,7 @@ def _controls(ocp: OCP) -> Iterator[Finding]:
 
 
 def wanted(ocp: OCP) -> np.ndarray:
-    """Return which states cost or constraints look at, bool (nx,)."""
+    """Return on which states cost or constraints depend, bool (nx,)."""
     m = ocp.model
     terms = [ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)]
     everything = ca.vertcat(*terms, *[c.expression for c in ocp.constraints])

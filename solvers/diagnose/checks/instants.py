@@ -91,7 +91,7 @@ def _contradiction(
 ) -> Finding:
     members = [elastic.demands[i] for i in conflict]
     worst = int(elastic.excess(answer).argmax())
-    demand, amount = elastic.demands[worst], float(answer.stretch[worst])
+    demand, amount = elastic.demands[worst], float(answer.slack[worst])
     if len(members) == 1:
         said = f"{members[0].label[0].upper()}{members[0].label[1:]} cannot be met by itself"
     else:
@@ -125,7 +125,7 @@ def _start(subject: DiagnosedProblem) -> Iterator[Finding]:
     if elastic.is_possible(answer) or not answer.found:
         return
     worst = int(elastic.excess(answer).argmax())
-    demand, amount = elastic.demands[worst], float(answer.stretch[worst])
+    demand, amount = elastic.demands[worst], float(answer.slack[worst])
     equation = any(d == demand and low == high for d, _, low, high in fixed)
     advice = (
         "An equation on the whole path holds at the start too: was at='terminal' meant?"

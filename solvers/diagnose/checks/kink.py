@@ -51,9 +51,9 @@ def _smoothness(subject: DiagnosedProblem, expression: ca.SX, switch: ca.SX) -> 
     m = subject.ocp.model
     z = ca.vertcat(m.x, m.u)
     slope = ca.jacobian(expression, z)
-    bend = ca.jacobian(slope, z)
+    curvature = ca.jacobian(slope, z)
     before, after = (_shift(point, s * _ASIDE * direction, m.nx) for s in (-1, 1))
-    for order, derivative in enumerate((expression, slope, bend)):
+    for order, derivative in enumerate((expression, slope, curvature)):
         left, right = (p.evaluate(subject.ocp, derivative) for p in (before, after))
         jump = np.abs(right - left).max()
         if not jump <= _JUMP * (1.0 + np.abs(left).max()):

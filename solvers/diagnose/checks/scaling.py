@@ -91,9 +91,9 @@ def _weights(
     ocp, m = subject.ocp, subject.ocp.model
     z = ca.vertcat(m.x, m.u)
     gradient = ca.gradient(ca.SX(ocp.running_cost), z)
-    bends = ca.vertcat(*[ca.jacobian(gradient[i], z[i]) for i in range(z.numel())])
+    diagonal = ca.vertcat(*[ca.jacobian(gradient[i], z[i]) for i in range(z.numel())])
     points = subject.tried if subject.trial.status.is_success else subject.along
-    values = points.evaluate(ocp, bends)
+    values = points.evaluate(ocp, diagonal)
     values = np.abs(values[np.isfinite(values).all(axis=1)]).max(axis=0, initial=0.0) * sizes**2
     there = np.flatnonzero(values > 0.0)
     if not there.size:

@@ -1,4 +1,4 @@
-"""Constraints that cannot say anything."""
+"""Constraints without effect: their bounds are infinite, or no variable appears in them."""
 
 from collections.abc import Iterator
 

@@ -1,25 +1,18 @@
 """``StagewiseNewton``: Newton's method by a Riccati recursion, within bounds of the controls."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ocp import (
-    OCP,
-    RK4,
-    InitialGuess,
-    Integrator,
-    Program,
-    Solution,
-    Solver,
-    Status,
-    UnsupportedProblem,
-    Work,
+from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, UnsupportedProblem, Work
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_positive,
+    check_whole,
 )
-from ocp.internal import RunData, check_instance, check_positive, check_whole
 from solvers.direct.newton.globalised_newton import GlobalisedNewton, NewtonOutcome
 from solvers.direct.newton.newton_step import Iterate, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid
@@ -84,7 +77,7 @@ class StagewiseNewton(Solver):
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
         grid = ShootingGrid.of(ocp, n, self.integrator, fast=fast)
-        return StagewiseNewtonProgram(self, step, grid)
+        return StagewiseNewtonProgram(self, ocp, step, grid)
 
 
 def _refuse(ocp: OCP) -> None:
@@ -99,11 +92,10 @@ def _refuse(ocp: OCP) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class StagewiseNewtonProgram(Program):
+class StagewiseNewtonProgram(MethodProgram):
     """A problem with its Newton step.
 
     Attributes:
-        solver: the options.
         step: the Newton step.
         grid: for first iterates, and to check the integrator.
     """
@@ -112,34 +104,23 @@ class StagewiseNewtonProgram(Program):
     step: NewtonStep
     grid: ShootingGrid
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data."""
-        started, solver, ocp = perf_counter(), self.solver, self.grid.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
+        solver, ocp = self.solver, self.ocp
         schedule = self.grid.schedule(data, ocp.duration)
         stages_and_end = [*schedule, data.values.at(1.0)[0]]
         newton = GlobalisedNewton(
             self.step, stages_and_end, solver.tolerance, solver.max_iterations
         )
-        outcome = newton.solve(self._first_iterate(data, ocp.first_guess(guess)))
+        outcome = newton.solve(self._first_iterate(data, guess))
         last = outcome.linearisation
         t = data.t0 + self.grid.fractions * ocp.duration
         status, message = self._check_accuracy(outcome, schedule, t)
-        return Solution(
-            problem=ocp,
-            solver=repr(solver),
+        return RunResult(
             status=status,
             message=message,
             t=t,
             x=last.at.x.T,
-            x0=data.x0,
             costate=last.at.costate.T,
             u=last.at.u.T,
             cost=last.measures.cost if np.isfinite(last.measures.cost) else np.inf,
@@ -147,8 +128,6 @@ class StagewiseNewtonProgram(Program):
             iterations=len(outcome.costs) - 1,
             work=Work(outcome.evaluations, outcome.evaluations, outcome.riccati_solves),
             history={"cost": outcome.costs, "residual": outcome.residuals},
-            parameters=data.values.as_dict(),
-            solve_time=perf_counter() - started,
         )
 
     def _check_accuracy(

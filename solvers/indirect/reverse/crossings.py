@@ -26,7 +26,7 @@ def meets_start(start: Manifold, x0: np.ndarray, radius: float) -> Condition:
     Args:
         start: the manifold at t0, one-dimensional.
         x0: the start (nx,), on it.
-        radius: how near to x0 its tangent still tells on which side a start is.
+        radius: distance from x0 within which its tangent tells on which side a start is.
     """
     tangent = start.tangent(x0)[:, 0]
 

@@ -28,7 +28,7 @@ _SEGMENTS, _FINE_STEPS, _NEWTON_STEPS = 15, 300, 12
 _SAME = 1e-6
 # A start this far from the manifold is not on it.
 _ON = 1e-6
-# The tangent at the start tells sides within so many gaps.
+# The tangent at the start tells sides within this multiple of the spacing.
 _RADIUS = 2.5
 
 
@@ -68,7 +68,7 @@ def enumerate_extremals(
     x0: ArrayLike | None = None,
     t0: float = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
-    gap: float = 0.3,
+    spacing: float = 0.3,
     points: int = 4000,
     keep: int | None = None,
     solver: IndirectShooting | None = None,
@@ -81,7 +81,7 @@ def enumerate_extremals(
     that curve, which is refined until neighbouring starts are near; where the condition at
     the start (thesis 3.55 for a given one, 3.52 for a free one) changes its sign, or turns
     back just before zero, the root is closed in on, and indirect multiple shooting makes it
-    exact. It is no proof: what happens between two points of the scan nobody has seen.
+    exact. It is no proof: between two points of the scan nothing is evaluated.
     See the page on extremals in the documentation.
 
     Args:
@@ -89,7 +89,7 @@ def enumerate_extremals(
         x0: start (nx,); default: the problem's.
         t0: initial time [s].
         parameters: values that differ from the declared ones.
-        gap: distance of neighbouring starts to aim at, in the unit of the states.
+        spacing: wanted distance of neighbouring starts, in the unit of the states.
         points: most points on one curve; the cheap motions are refined first.
         keep: make only so many of the cheapest roots exact; None: all of them.
         solver: that makes the roots exact; default: 15 segments, 300 steps.
@@ -103,7 +103,7 @@ def enumerate_extremals(
     check_whole(points, "enumerate_extremals: points")
     if keep is not None:
         check_whole(keep, "enumerate_extremals: keep")
-    check_positive(gap, "enumerate_extremals: gap")
+    check_positive(spacing, "enumerate_extremals: spacing")
     _refuse(ocp)
     kept = InvariantManifold.of(ocp)
     redundant_by_one(kept)
@@ -114,10 +114,10 @@ def enumerate_extremals(
     scanner = Scanner(
         integrate=motions.starts,
         astray=lambda x: np.abs(start.linearised(x)[0]).max(axis=1),
-        gap=gap,
+        spacing=spacing,
         most=points,
     )
-    crossings = Crossings(scanner, _condition(ocp, start, data.x0, _RADIUS * gap))
+    crossings = Crossings(scanner, _condition(ocp, start, data.x0, _RADIUS * spacing))
     scans = tuple(scanner.scan(curve) for curve in self_motions(end, seeds_around(end, data.x0)))
     roots = [crossings.on(scan) for scan in scans]
     costs = np.concatenate([root.costs for root in roots])
@@ -197,7 +197,7 @@ def _guess(motions: _Motions, start: Manifold, end: np.ndarray, x0: np.ndarray) 
 def _exact(
     program: IndirectShootingProgram, data: RunData, guesses: list[Guess]
 ) -> Iterator[Solution]:
-    """Yield what Newton makes of each guess, with the outcome of the second-order test."""
+    """Yield Newton's solution from each guess, with the outcome of the second-order test."""
     for guess in guesses:
         solution = program.run(
             x0=data.x0, t0=data.t0, parameters=data.values.as_dict(), guess=guess

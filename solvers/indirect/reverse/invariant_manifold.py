@@ -1,4 +1,4 @@
-"""The configurations that a problem's dynamics never leave, at one instant."""
+"""The manifold of configurations that a problem's dynamics never leave, at one instant."""
 
 from dataclasses import dataclass
 
@@ -108,10 +108,10 @@ def redundant_by_one(manifold: "Manifold | InvariantManifold") -> None:
 
 def out_of_reach(manifold: Manifold, rows: np.ndarray) -> str:
     """Say how near the nearest of some configurations comes to the manifold."""
-    gap = np.linalg.norm(manifold.linearised(rows)[0], axis=1).min()
+    distance = np.linalg.norm(manifold.linearised(rows)[0], axis=1).min()
     return (
         f"no configuration meets {manifold.name} at t = {manifold.t:.4g} s: the target is out "
-        f"of reach (the nearest that was found misses it by {gap:.3g})"
+        f"of reach (the nearest that was found misses it by {distance:.3g})"
     )
 
 

@@ -1,4 +1,4 @@
-"""Angles: states that a full turn leaves the same, found by asking the problem."""
+"""Angles: states in which the problem has the period of a full turn, found by evaluation."""
 
 from dataclasses import dataclass
 

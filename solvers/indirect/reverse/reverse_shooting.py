@@ -1,13 +1,11 @@
 """Reverse shooting: from the end manifold backwards, Newton on the redundancy alone."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from time import perf_counter
 from typing import Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp import (
     OCP,
@@ -15,14 +13,19 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Program,
-    Solution,
     Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
-from ocp.internal import RunData, check_instance, check_positive, check_whole
+from ocp.internal import (
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_instance,
+    check_positive,
+    check_whole,
+)
 from solvers.indirect.newton_iteration import NewtonResult, Solve, newton
 from solvers.indirect.reverse.chart import Chart
 from solvers.indirect.reverse.invariant_manifold import InvariantManifold, Manifold, out_of_reach
@@ -55,7 +58,7 @@ class ReverseShooting(Solver):
 
     The manifold is that of the problem's invariants (where there are none, of its terminal
     constraints), which the dynamics must keep. Like all single shooting it converges from near
-    by only, where the distance cost bites: ``enumerate_extremals`` looks everywhere.
+    by only, where the distance cost is active: ``enumerate_extremals`` scans all ends.
 
     Args:
         boundary: type of the boundary conditions.
@@ -103,11 +106,11 @@ class ReverseShooting(Solver):
             )
         kept = InvariantManifold.of(ocp)
         reverse = ReverseFlow.of(ocp, self.steps, self.integrator)
-        return ReverseShootingProgram(self, reverse, kept, transversality(ocp))
+        return ReverseShootingProgram(self, ocp, reverse, kept, transversality(ocp))
 
 
 @dataclass(frozen=True, eq=False)
-class ReverseShootingProgram(Program):
+class ReverseShootingProgram(MethodProgram):
     """A problem whose end is unknown, ready for Newton."""
 
     solver: ReverseShooting
@@ -115,32 +118,20 @@ class ReverseShootingProgram(Program):
     kept: InvariantManifold
     transversality: ca.Function
 
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data; of a guess only the final state is used.
 
         Without one Newton begins at the end configuration that is reached from the start by
         the shortest way.
         """
-        started = perf_counter()
-        ocp = self.reverse.extremals.ocp
-        data = RunData.of(ocp, x0, t0, parameters)
-        task = _Task(self, data, ShootingSchedule.of(ocp, data, self.solver.steps))
-        first = ocp.first_guess(guess)
-        rows = first.sample("x", np.array([1.0]), ocp.model.nx) if first else None
-        solution = task.solution(data.x0 if rows is None else rows[0])
-        return solution.with_(solve_time=perf_counter() - started)
+        run = _Run(self, data, ShootingSchedule.of(self.ocp, data, self.solver.steps))
+        rows = guess.sample("x", np.array([1.0]), self.ocp.model.nx) if guess else None
+        return run.result(data.x0 if rows is None else rows[0])
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
-    """One run."""
+class _Run:
+    """One run: the program, its data, and both end manifolds."""
 
     program: ReverseShootingProgram
     data: RunData
@@ -155,7 +146,7 @@ class _Task:
     def start(self) -> Manifold:
         return self.program.kept.at(self.schedule.t0, self.schedule.p_first)
 
-    def solution(self, guess: np.ndarray) -> Solution:
+    def result(self, guess: np.ndarray) -> RunResult:
         """Find an end configuration and integrate back from it."""
         rows, arrived = self.end.projected(guess[None, :])
         if not arrived[0]:
@@ -230,15 +221,21 @@ class _Task:
 
     # -- out ------------------------------------------------------------------------------
 
-    def _found(self, paths: SegmentTrajectories, results: list[NewtonResult]) -> Solution:
+    def _found(self, paths: SegmentTrajectories, results: list[NewtonResult]) -> RunResult:
         ext, back = self.program.reverse.extremals, self.schedule.reversed()
         t, x, costate, u = (a[::-1] for a in ext.trajectory(paths, back, back.duration))
         terminal = ext.ocp.functions.terminal_cost(x[-1], t[-1], self.schedule.p_last)
         x = x - self.start.periods.turns(x[0] - self.data.x0)
         status, message = self._verdict(results[-1], x[0])
-        return self._solution(
-            status, message, (t, x, costate, u), float(terminal) - float(paths.costs.sum())
-        ).with_(
+        return RunResult(
+            status=status,
+            message=message,
+            t=t,
+            x=x,
+            costate=costate,
+            u=u,
+            control_kind="extremal",
+            cost=float(terminal) - float(paths.costs.sum()),
             residual=results[-1].residual,
             iterations=sum(r.steps for r in results),
             work=Work(
@@ -262,25 +259,15 @@ class _Task:
             return Status.INACCURATE, f"the integration misses the start by {away:.3g}"
         return Status.STATIONARY, ""
 
-    def _stopped(self, status: Status, message: str) -> Solution:
+    def _stopped(self, status: Status, message: str) -> RunResult:
         still = self.program.reverse.extremals.still(self.data.x0, self.schedule)
-        return self._solution(status, message, still, np.inf)
-
-    def _solution(
-        self, status: Status, message: str, motion: tuple[np.ndarray, ...], cost: float
-    ) -> Solution:
-        t, x, costate, u = motion
-        return Solution(
-            problem=self.program.reverse.extremals.ocp,
-            solver=repr(self.program.solver),
+        return RunResult(
             status=status,
             message=message,
-            t=t,
-            x=x,
-            x0=self.data.x0,
-            costate=costate,
-            u=u,
+            t=still.t,
+            x=still.x,
+            costate=still.costate,
+            u=still.u,
             control_kind="extremal",
-            cost=cost,
-            parameters=self.data.values.as_dict(),
+            cost=np.inf,
         )

@@ -1,4 +1,4 @@
-"""A curve of end configurations and where each of their extremals began, finely enough."""
+"""A curve of end configurations with the starts of their extremals, refined until they are near."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from solvers.indirect.reverse.self_motion import SelfMotion
 
 # Points of the first, even scan on a unit of the curve's length.
 _DENSITY = 20.0
-# A start further from its manifold than this was not integrated but blown about.
+# A start further from its manifold than this is an error of the integration.
 _ASTRAY = 0.05
 # Halvings of the first spacing after which a jump is left as it is; fewer where one side is lost.
 _DEEPEST, _EDGE = 30, 6
@@ -45,7 +45,7 @@ class Scan:
     unresolved: int = 0
 
     @property
-    def gaps(self) -> np.ndarray:
+    def distances(self) -> np.ndarray:
         """Distance between neighbouring starts, whole turns apart, (K - 1,)."""
         return np.linalg.norm(
             self.curve.manifold.periods.wrapped(np.diff(self.starts, axis=0)), axis=1
@@ -63,13 +63,13 @@ class Scanner:
     Attributes:
         integrate: end configurations (K, nx) -> where they began.
         astray: starts (K, nx) -> distance from the manifold of starts (K,).
-        gap: distance of neighbouring starts to aim at, in the unit of the states.
+        spacing: wanted distance of neighbouring starts, in the unit of the states.
         most: points on a curve at which refinement ends.
     """
 
     integrate: Integrate
     astray: Astray
-    gap: float
+    spacing: float
     most: int
 
     def at(self, curve: SelfMotion, arc: np.ndarray) -> Scan:
@@ -87,30 +87,30 @@ class Scanner:
         """Scan a whole curve, halving intervals until neighbouring starts are near.
 
         The cheapest motions are refined first: where the number of points does not suffice,
-        it is the costly ones, which nobody wants, that stay coarse.
+        the costly ones stay coarse.
         """
         count = max(32, round(_DENSITY * curve.length))
-        spacing = curve.length / count
+        first = curve.length / count
         found = self.at(curve, np.linspace(0.0, curve.length, count + 1))
         while len(found.arc) < self.most:
-            wide = self._wide(found, spacing)
+            wide = self._wide(found, first)
             if not wide.size:
                 break
-            wide = wide[self._urgency(found, wide, spacing)]
+            wide = wide[self._urgency(found, wide, first)]
             wide = wide[: min(_BATCH, self.most - len(found.arc))]
             middles = (found.arc[wide] + found.arc[wide + 1]) / 2.0
             found = merged(found, self.at(curve, np.sort(middles)))
         left = self._too_far(found) & found.valid[:-1] & found.valid[1:]
         return replace(found, unresolved=int(left.sum()))
 
-    def _wide(self, scan: Scan, spacing: float) -> np.ndarray:
+    def _wide(self, scan: Scan, first: float) -> np.ndarray:
         """Return the intervals to halve."""
         width, valid = np.diff(scan.arc), scan.valid
         both, one = valid[:-1] & valid[1:], valid[:-1] ^ valid[1:]
-        deep = both & self._too_far(scan) & (width > spacing / 2.0**_DEEPEST)
-        return np.flatnonzero(deep | (one & (width > spacing / 2.0**_EDGE)))
+        deep = both & self._too_far(scan) & (width > first / 2.0**_DEEPEST)
+        return np.flatnonzero(deep | (one & (width > first / 2.0**_EDGE)))
 
-    def _urgency(self, scan: Scan, wide: np.ndarray, spacing: float) -> np.ndarray:
+    def _urgency(self, scan: Scan, wide: np.ndarray, first: float) -> np.ndarray:
         """Return the order in which to halve intervals: cheap ones first, and wide ones.
 
         Cheap alone would spend all points in the first cascade of folds that is met.
@@ -118,11 +118,11 @@ class Scanner:
         valid = scan.costs[scan.valid]
         spread = (np.median(valid) - valid.min()) / 10.0 + np.finfo(float).tiny
         above = np.minimum(scan.costs[wide], scan.costs[wide + 1]) - valid.min()
-        halvings = np.log2(spacing / np.diff(scan.arc)[wide])
+        halvings = np.log2(first / np.diff(scan.arc)[wide])
         return np.argsort(np.log2(1.0 + above / spread) + _PATIENCE * halvings, kind="stable")
 
     def _too_far(self, scan: Scan) -> np.ndarray:
-        return scan.gaps > self.gap
+        return scan.distances > self.spacing
 
 
 def merged(one: Scan, other: Scan) -> Scan:

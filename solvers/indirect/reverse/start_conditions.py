@@ -1,4 +1,4 @@
-"""What a reverse integration asks at t0, and the problems it has no place for."""
+"""The conditions of reverse shooting at t0, and the problems that it refuses."""
 
 import casadi as ca
 import numpy as np

@@ -153,7 +153,7 @@ class _Search:
 
     def _excess(self, y: np.ndarray) -> np.ndarray:
         """Return by how much each row that is not met exceeds its bounds, negative below."""
-        qp, z = self._qp, (self._start - self._space.pull(self.met, y))[: self._n]
+        qp, z = self._qp, (self._start - self._space.displacement(self.met, y))[: self._n]
         rows = qp.products.G @ z
         excess = np.maximum(rows - qp.u, 0.0) + np.minimum(rows - qp.l, 0.0)
         excess[self.met] = 0.0

@@ -16,26 +16,26 @@ def least_violation(qp: QP, elastic: np.ndarray, rows: int) -> tuple[np.ndarray,
 
     Args:
         qp: the program; its cost does not count.
-        elastic: indices of the rows that may give way.
+        elastic: indices of the rows that are relaxed.
         rows: number of rows to report on.
 
     Returns:
-        a point (n,) and the excess of each row (rows,), zero where nothing need give way. If
-        even the hard rows contradict each other, all rows give way.
+        a point (n,) and the excess of each row (rows,), zero where all can be met. If
+        even the hard rows contradict each other, all rows are relaxed.
     """
-    for give_way in (elastic, np.flatnonzero(qp.l != qp.u), np.arange(len(qp.l))):
-        point, excess = _solve(qp, give_way)
+    for relaxed in (elastic, np.flatnonzero(qp.l != qp.u), np.arange(len(qp.l))):
+        point, excess = _solve(qp, relaxed)
         if point is not None:
             return point, excess[:rows]
     return np.zeros(len(qp.g)), np.zeros(rows)
 
 
-def _solve(qp: QP, give_way: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
-    n, count = len(qp.g), len(give_way)
-    # Towards every row its excess: upper rows G z - e <= u, lower rows -G z - e <= -l.
-    select = sp.csr_matrix((np.ones(count), (give_way, np.arange(count))), shape=(len(qp.l), count))
+def _solve(qp: QP, relaxed: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+    n, count = len(qp.g), len(relaxed)
+    # Every row with its excess: upper rows G z - e <= u, lower rows -G z - e <= -l.
+    select = sp.csr_matrix((np.ones(count), (relaxed, np.arange(count))), shape=(len(qp.l), count))
     equal = qp.l == qp.u
-    equal[give_way] = False
+    equal[relaxed] = False
     above, below = np.isfinite(qp.u) & ~equal, np.isfinite(qp.l) & ~equal
     g = qp.G.tocsr()
     upper = sp.vstack(
@@ -57,5 +57,5 @@ def _solve(qp: QP, give_way: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]
     excess = np.zeros(len(qp.l))
     if found.x is None:
         return None, excess
-    excess[give_way] = found.x[n:]
+    excess[relaxed] = found.x[n:]
     return found.x[:n], excess

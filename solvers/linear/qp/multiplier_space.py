@@ -69,8 +69,8 @@ class MultiplierSpace:
         slots = self._slots(rows)
         return self._m[slots[:, None], slots]
 
-    def pull(self, rows: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return V y: how far multipliers of some rows move (z_0; y_e)."""
+    def displacement(self, rows: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return V y: by which multipliers of some rows move (z_0; y_e)."""
         return self._v[:, self._slots(rows)] @ y
 
     def optimum(self, qp: QP, rows: np.ndarray, bound: np.ndarray) -> Optimum | None:
@@ -91,7 +91,7 @@ class MultiplierSpace:
             step = self._solve(right)
             if rows.size:
                 own = LAPACK.dpotrs(factor, (products.G @ step[:n])[rows] - wanted)[0]
-                step -= self.pull(rows, own)
+                step -= self.displacement(rows, own)
                 y[rows] += own
             z = z + step[:n]
             y[self._equations] += step[n:]
@@ -105,7 +105,7 @@ class MultiplierSpace:
         return Optimum(z, y)
 
     def _slots(self, rows: np.ndarray) -> np.ndarray:
-        """Return where rows stand in V and M, after computing what is missing."""
+        """Return the places of rows in V and M, after computing what is missing."""
         slots = self._slot[rows]
         if (slots >= 0).all():
             return slots

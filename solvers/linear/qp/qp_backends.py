@@ -1,4 +1,4 @@
-"""Who solves a quadratic program: OSQP, kept factorised, or any backend of qpsolvers."""
+"""Backends for quadratic programs: OSQP, kept factorised, or any backend of qpsolvers."""
 
 import pkgutil
 import warnings
@@ -163,7 +163,7 @@ class NamedBackend(QpBackend):
 
 
 class _SparseRows:
-    """The rows of a program sorted as qpsolvers wants them: equations, and those below a bound."""
+    """The rows of a program sorted as qpsolvers takes them: equations, and those below a bound."""
 
     def __init__(self, qp: QP, sparse: bool) -> None:
         self._h, self._g = qp.H, qp.G
@@ -207,7 +207,7 @@ def qp_backend(name: str, tolerance: float) -> QpBackend:
     """Return a backend by its name.
 
     Raises:
-        ProblemError: if nobody knows the name, or with what to type if it is not installed.
+        ProblemError: if the name is unknown, or, with the command to type, if it is not installed.
     """
     known = known_backends()
     if name not in known:

@@ -27,6 +27,14 @@ class Products(NamedTuple):
         return cls(h.tocsr(), g.tocsr(), g.T.tocsr())
 
 
+class QpVectors(NamedTuple):
+    """What changes from run to run: g, and the bounds l and u of the rows."""
+
+    g: np.ndarray
+    l: np.ndarray  # noqa: E741
+    u: np.ndarray
+
+
 class QP(NamedTuple):
     r"""A convex quadratic program.
 
@@ -85,14 +93,14 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
         y: multipliers (rows,), positive at upper bounds, negative at lower ones. The sign a
             bound that does not exist would have counts as a dual residual.
     """
-    rows, curved, pulled = qp.products.G @ z, qp.products.H @ z, qp.products.Gt @ y
-    primal = max((qp.l - rows).max(initial=0.0), (rows - qp.u).max(initial=0.0))
+    gz, hz, gty = qp.products.G @ z, qp.products.H @ z, qp.products.Gt @ y
+    primal = max((qp.l - gz).max(initial=0.0), (gz - qp.u).max(initial=0.0))
     impossible = np.where(y > 0.0, np.isinf(qp.u), np.isinf(qp.l)) * np.abs(y)
-    dual = max(np.abs(curved + qp.g + pulled).max(initial=0.0), impossible.max(initial=0.0))
+    dual = max(np.abs(hz + qp.g + gty).max(initial=0.0), impossible.max(initial=0.0))
     bound = np.where(y > 0.0, qp.u, qp.l)
     paid = y @ np.where(np.isfinite(bound), bound, 0.0)
-    quadratic, linear = float(z @ curved), float(qp.g @ z)
-    sizes = [np.abs(v).max(initial=0.0) for v in (rows, curved, qp.g, pulled)]
+    quadratic, linear = float(z @ hz), float(qp.g @ z)
+    sizes = [np.abs(v).max(initial=0.0) for v in (gz, hz, qp.g, gty)]
     return Residuals(
         primal / (1.0 + sizes[0]),
         dual / (1.0 + max(sizes[1:])),
@@ -103,7 +111,7 @@ def residuals(qp: QP, z: np.ndarray, y: np.ndarray) -> Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Softening:
-    r"""Rows that may be exceeded at a price.
+    r"""Rows that may be exceeded, with a penalty.
 
     .. math:: l_i - e_i \le G_i z \le u_i + e_i, \quad e_i \ge 0, \quad
               \dots + w (e_i + e_i^2/2)
@@ -113,11 +121,11 @@ class Softening:
 
     Attributes:
         rows: which rows, indices (s,).
-        price: w, positive.
+        penalty: w, positive.
     """
 
     rows: np.ndarray
-    price: float
+    penalty: float
 
     def soften(self, h: sp.csc_matrix, g: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
         """Return the matrices H and G of the program with slacks e behind z."""
@@ -129,20 +137,19 @@ class Softening:
         zero = sp.csc_matrix((count, _shape(g)[1]))
         rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
         return (
-            sp.csc_matrix(sp.block_diag([h, self.price * unit], format="csc")),
+            sp.csc_matrix(sp.block_diag([h, self.penalty * unit], format="csc")),
             sp.csc_matrix(rows),
         )
 
-    def bounds(
-        self, g: np.ndarray, low: np.ndarray, high: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def soften_vectors(self, vectors: QpVectors) -> QpVectors:
         """Return g, l and u of the program with slacks."""
+        g, low, high = vectors
         count = len(self.rows)
         hard = low.copy()
         hard[self.rows] = -np.inf
         free = np.full(count, np.inf)
-        return (
-            np.concatenate([g, np.full(count, self.price)]),
+        return QpVectors(
+            np.concatenate([g, np.full(count, self.penalty)]),
             np.concatenate([hard, low[self.rows], np.zeros(count)]),
             np.concatenate([high, free, free]),
         )

@@ -1,0 +1,99 @@
+"""One ``run`` for all methods: each computes a ``RunResult``, and a ``Solution`` is made of it."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
+from ocp.solution.solution import ControlKind, Solution, Work
+from ocp.solution.solver import InitialGuess, Program, Solver
+from ocp.solution.status import Status
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunResult:
+    """What a method knows at the end of a run. Every field means what it means in ``Solution``."""
+
+    status: Status
+    message: str = ""
+    t: np.ndarray
+    x: np.ndarray
+    costate: np.ndarray
+    u: np.ndarray
+    control_kind: ControlKind = "held"
+    breaks: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
+    cost: float
+    residual: float = 0.0
+    iterations: int = 0
+    work: Work = field(default_factory=Work)
+    history: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class MethodProgram(Program):
+    """A program that solves by itself; one that runs other programs derives from ``Program``.
+
+    Attributes:
+        solver: the options.
+        ocp: the problem.
+    """
+
+    solver: Solver
+    ocp: OCP
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: InitialGuess | None = None,
+    ) -> Solution:
+        """Solve for these data, see ``Program.run``."""
+        started = perf_counter()
+        data = RunData.of(self.ocp, x0, t0, parameters)
+        result = self._solve(data, self._first_guess(guess))
+        seconds = perf_counter() - started
+        return Solution(
+            problem=self.ocp,
+            solver=self._solver_text,
+            status=result.status,
+            message=result.message,
+            t=result.t,
+            x=result.x,
+            x0=data.x0,
+            costate=result.costate,
+            u=result.u,
+            control_kind=result.control_kind,
+            breaks=result.breaks,
+            cost=result.cost,
+            residual=result.residual,
+            iterations=result.iterations,
+            work=result.work,
+            history=result.history,
+            parameters=data.values.as_dict(),
+            solve_time=seconds,
+        )
+
+    @abstractmethod
+    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
+        """Solve for checked data.
+
+        Args:
+            data: start, initial time and parameters of the run.
+            guess: where to start: what the caller gives, else the guess of the problem.
+        """
+
+    def _first_guess(self, given: InitialGuess | None) -> InitialGuess | None:
+        """Return where a run starts, checked."""
+        return self.ocp.first_guess(given)
+
+    @cached_property
+    def _solver_text(self) -> str:
+        return repr(self.solver)
