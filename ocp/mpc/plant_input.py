@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,36 @@ from ocp.problem.ocp import OCP
 
 # (x, u, t, p) -> input (m,).
 InputMap = Callable[[np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
+
+
+class InputBounds(NamedTuple):
+    """The bounds of an input, and the same as plain numbers.
+
+    Attributes:
+        box: the bounds, each (m,).
+        lower: as numbers, finite where there is none: an infinite input is outside.
+        upper: likewise.
+    """
+
+    box: Box
+    lower: list[float]
+    upper: list[float]
+
+    @classmethod
+    def of(cls, box: Box) -> "InputBounds":
+        """Return the bounds of a box of a given size."""
+        largest = np.finfo(float).max
+        lower, upper = (np.clip(side, -largest, largest) for side in (box.lower, box.upper))
+        return cls(box, lower.tolist(), upper.tolist())
+
+    def clip(self, given: np.ndarray) -> tuple[np.ndarray, float]:
+        """Return an input within the bounds, and by how much it was moved: NaN or inf for such."""
+        # Nearly all inputs need no clipping, and plain numbers say so sooner than numpy does.
+        each = zip(given.tolist(), self.lower, self.upper, strict=True)
+        if all([low <= value <= high for value, low, high in each]):
+            return given.copy(), 0.0
+        inside = self.box.clip(given)
+        return inside, float(np.abs(given - inside).max())
 
 
 @dataclass(frozen=True)

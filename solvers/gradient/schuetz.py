@@ -1,7 +1,7 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Literal, get_args
 
@@ -89,6 +89,10 @@ class Schuetz(Solver):
             max_iterations=max_iterations,
             decrease=0.0,
         )
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Schuetz":
+        """Set what is left open; see ``Solver``."""
+        return replace(self, compiled=True) if compiled else self
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""

@@ -1,7 +1,7 @@
 """Newton's method stage by stage: the quickest way to a minimum within bounds of the controls."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -75,6 +75,10 @@ class StagewiseNewton(Solver):
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")
         for name in ("tolerance", "accuracy"):
             check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
+        """Set what is left open; see ``Solver``."""
+        return replace(self, compiled=True) if compiled else self
 
     def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
