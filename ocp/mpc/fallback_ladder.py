@@ -17,7 +17,7 @@ from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.mpc.backup_selection import Backup
 from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
-from ocp.mpc.plant_input import InputBounds, InputMap, PlantInput
+from ocp.mpc.plant_input import InputMap, PlantInput
 from ocp.problem.ocp import OCP
 from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
 from ocp.solution.solution import Solution
@@ -34,24 +34,19 @@ class StepInputs(NamedTuple):
     Attributes:
         t: when the state was measured [s].
         applies_at: when the input acts [s].
-        start: the state then (nx,), predicted where need be.
-        is_measured: False where the measurement is missing; the last plan's state is used
-            instead, if there is a plan.
+        start: the state then (nx,), predicted where need be; of the last plan where nothing is
+            measured and there is a plan.
         parameters: of the horizon from ``applies_at`` on.
-        unknown: why they are those of the last plan, as far as they reach; empty where known.
+        parameters_known: False where they are those of the last plan, as far as they reach.
+        unsolvable: why the solver cannot be run; empty where it can.
     """
 
     t: float
     applies_at: float
     start: np.ndarray
-    is_measured: bool
     parameters: HorizonParameters
-    unknown: str
-
-    @property
-    def is_solvable(self) -> bool:
-        """Whether the solver has what it needs."""
-        return self.is_measured and not self.unknown
+    parameters_known: bool
+    unsolvable: str
 
 
 class SelectedInput(NamedTuple):
@@ -79,12 +74,14 @@ class FallbackLadder:
     """A controller that is built: what it knows from earlier steps is given to each step.
 
     Attributes:
-        program: solves the problem.
+        program: the built solver.
+        duration: of the horizon [s].
         See ``MPC`` for all others.
     """
 
     ocp: OCP
     program: Program
+    duration: float
     dt: float
     applied: PlantInput
     backup: Backup
@@ -111,61 +108,62 @@ class FallbackLadder:
         """
         started = perf_counter()
         inputs = self._collect(state, x, t, parameters)
-        plan, status, reason = self._solve(inputs, state)
+        measured_at, applies_at, start, p, known, unsolvable = inputs
+        plan, status, message = self._solve(inputs, state)
         used = perf_counter() - started
         is_late = plan is not None and (used > self.budget if late is None else late)
 
-        reasons = [inputs.unknown, reason]
         selected, is_new = None, False
         if is_late:
-            reasons.append(f"the answer came after {used:.3g} s, too late for its step")
+            too_late = f"the answer came after {used:.3g} s, too late for its step"
+            message = _joined(message, too_late)
         elif plan is not None:
             best = InputSource.OPTIMAL if status is Status.SOLVED else InputSource.FEASIBLE
-            selected, reason = self._follow(plan, inputs, best)
-            reasons.append(reason)
+            selected, reason = self._follow(plan, start, applies_at, p, best)
+            message = _joined(message, reason)
             is_new = selected is not None
         if selected is None:
-            selected, reason = self._follow_shifted(state.plan, inputs)
-            reasons.append(reason)
+            selected, reason = self._follow_shifted(state.plan, start, applies_at, p)
+            message = _joined(message, reason)
         if selected is None:
-            selected, reason = self._back_up(inputs, state.last_input)
-            reasons.append(reason)
+            selected, reason = self._back_up(state.last_input, start, applies_at, p)
+            message = _joined(message, reason)
 
         given = None if selected is None else selected.input
         new_plan = plan if is_late or is_new else None
-        after = state.after(given, new_plan, solver_ran=inputs.is_solvable)
-        message, known = "; ".join(filter(None, reasons)), not inputs.unknown
+        after = state.after(given, new_plan, solver_ran=not unsolvable)
+        residual = plan.residual if plan else np.inf
         if selected is None:
             report = StepReport(
-                t=inputs.t,
-                applies_at=inputs.applies_at,
+                t=measured_at,
+                applies_at=applies_at,
                 status=status,
                 message=message,
-                residual=plan.residual if plan else np.inf,
+                residual=residual,
                 late=is_late,
-                parameters=inputs.parameters.by_name if known else {},
+                parameters=p.by_name if known else {},
                 parameters_known=known,
                 new_plan=new_plan,
                 time_used=perf_counter() - started,
             )
             return report, after
         source, given, clipped, followed = selected
-        made_at = inputs.applies_at if is_new or followed is None else followed.t[0]
+        made_at = applies_at if is_new or followed is None else followed.t[0]
         decision = Decision(
-            t=inputs.t,
-            applies_at=inputs.applies_at,
+            t=measured_at,
+            applies_at=applies_at,
             status=status,
             message=message,
-            residual=plan.residual if plan else np.inf,
+            residual=residual,
             late=is_late,
-            parameters=inputs.parameters.by_name if known else {},
+            parameters=p.by_name if known else {},
             parameters_known=known,
             new_plan=new_plan,
             time_used=perf_counter() - started,
             input=given,
             source=source,
             plan=followed,
-            age=round((inputs.applies_at - made_at) / self.dt),
+            age=round((applies_at - made_at) / self.dt),
             clipped=clipped,
         )
         return decision, after
@@ -173,11 +171,7 @@ class FallbackLadder:
     # -- collect -----------------------------------------------------------------------------
 
     def _collect(
-        self,
-        state: ControllerState,
-        x: ArrayLike,
-        t: float,
-        parameters: Mapping[str, ArrayLike] | None,
+        self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
     ) -> StepInputs:
         """Check the measurement, get the parameters, and predict the state over the delay."""
         name, nx, plan = self.ocp.name, self.ocp.model.nx, state.plan
@@ -185,15 +179,16 @@ class FallbackLadder:
         start = check_numeric(x, f"MPC of {name}: x")
         if start.shape != (nx,):
             raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
-        p, unknown = self._horizon_parameters(state, applies_at, parameters)
+        p, unknown = self._horizon_parameters(state, applies_at, given)
         is_measured = all(map(isfinite, start.tolist()))
         if not is_measured:  # without a plan the backup law sees what was measured
             start = start if plan is None else plan.state(applies_at)
         elif self.compensate and state.pending:
             at_effect = p.at(applies_at)
-            for k, given in enumerate(state.pending):
-                start = self._next_state(start, given, t + k * self.dt, at_effect)
-        return StepInputs(float(t), applies_at, start, is_measured, p, unknown)
+            for k, sent in enumerate(state.pending):
+                start = self._next_state(start, sent, t + k * self.dt, at_effect)
+        unsolvable = unknown if is_measured else _joined(unknown, "the measurement is not finite")
+        return StepInputs(float(t), applies_at, start, p, not unknown, unsolvable)
 
     def _horizon_parameters(
         self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
@@ -212,7 +207,7 @@ class FallbackLadder:
                 start, known = (state.plan.t[0], state.plan.parameters) if state.plan else (t, None)
                 values = self.ocp.parameter_values(known)
         by_name = values.as_dict() if values.entries else {}
-        return HorizonParameters(values, by_name, start, self._duration), unknown
+        return HorizonParameters(values, by_name, start, self.duration), unknown
 
     def _next_state(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the model's state one interval after t [s] under an input, parameters held."""
@@ -226,9 +221,9 @@ class FallbackLadder:
         self, inputs: StepInputs, state: ControllerState
     ) -> tuple[Solution | None, Status | None, str]:
         """Return a new plan that meets the constraints, how the solver ended, and a reason."""
-        if not inputs.is_solvable:
-            return None, None, "" if inputs.is_measured else "the measurement is not finite"
-        start, t, p = inputs.start, inputs.applies_at, inputs.parameters
+        _, t, start, p, _, unsolvable = inputs
+        if unsolvable:
+            return None, None, unsolvable
         last = None if state.cold_start else state.plan
         guess = ShiftedPlan(last, t) if last else self.guess
         try:
@@ -245,48 +240,53 @@ class FallbackLadder:
 
     # -- the rungs ---------------------------------------------------------------------------
 
-    def _follow_shifted(self, plan: Solution | None, inputs: StepInputs) -> Rung:
+    def _follow_shifted(
+        self, plan: Solution | None, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> Rung:
         """Follow the last good plan, if its remainder meets the constraints."""
         if plan is None:
             return None, "there is no earlier plan"
-        start, t, p = inputs.start, inputs.applies_at, inputs.parameters
         excess, worst = self._check.remainder(plan, start, t, p)
         if excess > self.tolerance:
             return None, f"the earlier plan: {worst}"
-        return self._follow(plan, inputs, InputSource.SHIFTED)
+        return self._follow(plan, start, t, p, InputSource.SHIFTED)
 
-    def _back_up(self, inputs: StepInputs, last: np.ndarray | None) -> Rung:
+    def _back_up(
+        self, last: np.ndarray | None, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
-        t, size = inputs.applies_at, self.applied.size(self.ocp)
-        p = inputs.parameters.at(t)
-        given, reason = self.backup.input(inputs.start, t, p, size=size, last=last)
+        size = self.applied.size(self.ocp)
+        given, reason = self.backup.input(start, t, p.at(t), size=size, last=last)
         if given is None:
             return None, reason
         selected, problem = self._bounded(given, InputSource.BACKUP)
-        return selected, "; ".join(filter(None, (reason, problem)))
+        return selected, _joined(reason, problem)
 
-    def _follow(self, plan: Solution, inputs: StepInputs, source: InputSource) -> Rung:
-        """Return the input that a plan has for this step."""
+    def _follow(
+        self, plan: Solution, x: np.ndarray, t: float, p: HorizonParameters, source: InputSource
+    ) -> Rung:
+        """Take the input that a plan has at t [s]."""
         # A control that moves is held at its value in the middle of the interval, its mean but
         # for second-order terms.
-        t, middle = inputs.applies_at, 0.0 if plan.control_kind == "held" else 0.5 * self.dt
-        u, p = plan_controls(plan, t + middle), inputs.parameters.at(t)
-        return self._bounded(self._input_map(inputs.start, u, t, p), source, plan)
+        middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
+        u = plan_controls(plan, t + middle)
+        return self._bounded(self._input_map(x, u, t, p.at(t)), source, plan)
 
     def _bounded(
         self, given: np.ndarray, source: InputSource, plan: Solution | None = None
     ) -> Rung:
         """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
-        inside, excess = self._bounds.clip(given)
+        # Nearly all inputs need no clipping, and plain numbers say so sooner than numpy does.
+        each = zip(given.tolist(), *self._limits, strict=True)
+        if all([low <= value <= high for value, low, high in each]):
+            return SelectedInput(source, given.copy(), 0.0, plan), ""
+        inside = self.applied.box(self.ocp).clip(given)
+        excess = float(np.abs(given - inside).max())  # not finite where the input is not
         if not isfinite(excess):
             return None, f"the input {given} is not finite"
         if plan is not None and excess > self.tolerance:
             return None, f"the input {given} leaves its bounds by {excess:.3g}"
         return SelectedInput(source, inside, excess, plan), ""
-
-    @cached_property
-    def _duration(self) -> float:
-        return self.ocp.duration
 
     @cached_property
     def _check(self) -> PlanCheck:
@@ -297,5 +297,9 @@ class FallbackLadder:
         return self.applied.sending(self.ocp)
 
     @cached_property
-    def _bounds(self) -> InputBounds:
-        return InputBounds.of(self.applied.box(self.ocp))
+    def _limits(self) -> tuple[list[float], list[float]]:
+        return self.applied.limits(self.ocp)
+
+
+def _joined(said: str, more: str) -> str:
+    return f"{said}; {more}" if said and more else said or more

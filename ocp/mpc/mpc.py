@@ -46,11 +46,11 @@ class MPC:
     3. the ``backup`` law, ``BACKUP``;
     4. ``ControlRefused``.
 
-    Where two runs of the solver in a row bring no good plan, every other one starts afresh, as the
-    first step does, since the last plan may be what leads it astray.
+    After two runs of the solver in a row without a plan that meets the constraints, every other one
+    starts cold, as the first step does, since the last plan may mislead it.
 
-    An answer that took longer than ``budget`` came too late for its step: it is not applied
-    but remembered, and the next rungs see it as the last plan. Source: thesis Algorithm 3,
+    A plan that took longer than ``budget`` is too late for its step: it is not applied, but kept
+    as the last plan of later steps. Source: thesis Algorithm 3,
     2.2.1; [Mayne et al. 2000].
 
     Args:
@@ -80,6 +80,7 @@ class MPC:
 
     Attributes:
         backup_law: the law in force, and why the problem suggests no other.
+        state: what is known from earlier steps; it may be kept and set again.
 
     Raises:
         ProblemError: if interval, delay, budget, backup or bounds do not fit the problem.
@@ -117,6 +118,7 @@ class MPC:
         return FallbackLadder(
             ocp=self.ocp,
             program=solver.build(self.ocp),
+            duration=self.ocp.duration,
             dt=self.dt,
             applied=self.applied,
             backup=self.backup_law,
@@ -154,7 +156,7 @@ class MPC:
 
     @property
     def is_stateful(self) -> bool:
-        """Whether the solver's own answers depend on the runs before."""
+        """Whether a solution depends on the solver's earlier runs, other than by the guess."""
         return self._ladder.program.is_stateful
 
     def reset(self, acting: ArrayLike | None = None) -> None:
@@ -181,7 +183,7 @@ class MPC:
         Args:
             x: measured state (nx,); NaN is a missing measurement.
             t: when it was measured [s].
-            late: whether the answer counts as late; default: by the clock.
+            late: whether the new plan is late for this step; default: by the clock and ``budget``.
             parameters: of the horizon that starts when the input acts, by name; default: what
                 the controller's own ``parameters`` say.
 

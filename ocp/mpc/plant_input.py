@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -14,36 +14,6 @@ from ocp.problem.ocp import OCP
 
 # (x, u, t, p) -> input (m,).
 InputMap = Callable[[np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
-
-
-class InputBounds(NamedTuple):
-    """The bounds of an input, and the same as plain numbers.
-
-    Attributes:
-        box: the bounds, each (m,).
-        lower: as numbers, finite where there is none: an infinite input is outside.
-        upper: likewise.
-    """
-
-    box: Box
-    lower: list[float]
-    upper: list[float]
-
-    @classmethod
-    def of(cls, box: Box) -> "InputBounds":
-        """Return the bounds of a box of a given size."""
-        largest = np.finfo(float).max
-        lower, upper = (np.clip(side, -largest, largest) for side in (box.lower, box.upper))
-        return cls(box, lower.tolist(), upper.tolist())
-
-    def clip(self, given: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return an input within the bounds, and by how much it was moved: NaN or inf for such."""
-        # Nearly all inputs need no clipping, and plain numbers say so sooner than numpy does.
-        each = zip(given.tolist(), self.lower, self.upper, strict=True)
-        if all([low <= value <= high for value, low, high in each]):
-            return given.copy(), 0.0
-        inside = self.box.clip(given)
-        return inside, float(np.abs(given - inside).max())
 
 
 @dataclass(frozen=True)
@@ -76,13 +46,19 @@ class PlantInput:
         """Return the bounds of the input, each (m,).
 
         Raises:
-            ProblemError: if they do not fit, or a rate is asked of a discrete-time model.
+            ProblemError: if they do not fit, or a discrete-time model is to send a rate.
         """
         if self.what == "control":
             return ocp.control_bounds
         if ocp.model.is_discrete:
             raise ProblemError(f"{ocp.name}: a discrete-time model has no rate to apply")
         return (self.bounds or Box()).sized(ocp.model.nx, f"{ocp.name}: bounds of the rate")
+
+    def limits(self, ocp: OCP) -> tuple[list[float], list[float]]:
+        """Return the bounds as numbers, finite where there is none: inf is outside of them."""
+        largest, box = np.finfo(float).max, self.box(ocp)
+        lower, upper = (np.clip(side, -largest, largest) for side in (box.lower, box.upper))
+        return lower.tolist(), upper.tolist()
 
     def sending(self, ocp: OCP) -> InputMap:
         """Return what makes an input of a state and a control of the problem."""
