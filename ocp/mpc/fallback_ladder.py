@@ -102,10 +102,7 @@ class FallbackLadder:
         late: bool | None,
         parameters: Mapping[str, ArrayLike] | None,
     ) -> tuple[StepReport, ControllerState]:
-        """Return what was decided, and what is known afterwards; see ``MPC.step``.
-
-        The report is a ``Decision`` unless no rung holds.
-        """
+        """Return a ``Decision``, or a report where no rung holds, and what is known afterwards."""
         started = perf_counter()
         inputs = self._collect(state, x, t, parameters)
         measured_at, applies_at, start, p, known, unsolvable = inputs
@@ -168,8 +165,6 @@ class FallbackLadder:
         )
         return decision, after
 
-    # -- collect -----------------------------------------------------------------------------
-
     def _collect(
         self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
     ) -> StepInputs:
@@ -214,8 +209,6 @@ class FallbackLadder:
         if self.applied.what == "rate":
             return x + self.dt * given
         return self._check.next_state(x, given, t, p)
-
-    # -- solve and check ---------------------------------------------------------------------
 
     def _solve(
         self, inputs: StepInputs, state: ControllerState

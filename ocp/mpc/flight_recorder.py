@@ -22,8 +22,8 @@ class FlightRecorder:
     """Writes a record after every step of an ``MPC``, whether it was decided or refused.
 
     The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
-    the shapes of its arrays, these as doubles (what was measured, the input, the plan where
-    another one was found good, the parameters), and the message. A record that was cut off by a
+    the shapes of its arrays, these as doubles (what was measured, the input, the step's new
+    plan if there is one, the parameters), and the message. A record that was cut off by a
     crash is ignored later. Use it as a context manager and give its ``watch`` to the loop. A record
     begins with a controller that knows nothing yet: a loop resets it; else call ``reset``.
 
