@@ -44,9 +44,9 @@ def receding(
     )
     run = mpc.run(_plant(dt, moving), np.zeros(2), duration).or_raise()
     # A figure of the optimal control law has no place for another rung of the ladder.
-    worse = next((d for d in run.decisions if d.outcome is not InputSource.OPTIMAL), None)
+    worse = next((d for d in run.decisions if d.source is not InputSource.OPTIMAL), None)
     if worse is not None:
-        raise SolverError(f"N = {steps}, t = {worse.t:g} s: {worse.outcome.name}, {worse.message}")
+        raise SolverError(f"N = {steps}, t = {worse.t:g} s: {worse.source.name}, {worse.message}")
     return run
 
 

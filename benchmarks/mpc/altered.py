@@ -1,7 +1,7 @@
 """A good solver whose answers are changed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
@@ -19,6 +19,11 @@ class Altered(Solver):
 
     inner: Solver
     change: Callable[[Solution, float], Solution]
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Altered":
+        """Set what is left open; see ``Solver``."""
+        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
+        return replace(self, inner=inner)
 
     def build(self, ocp: OCP) -> "AlteredProgram":
         """Build the inner one."""

@@ -30,7 +30,7 @@ class FaultReport:
         subject: cart or arm.
         steps: in all.
         faults: faults by kind.
-        outcomes: decisions by kind of fault ("none" between them) and rung.
+        sources: decisions by kind of fault ("none" between them) and rung.
         bad_inputs: that are not finite or leave their bounds.
         unnamed: steps that are not optimal and do not say why.
         lies: steps called optimal although they cannot be.
@@ -43,7 +43,7 @@ class FaultReport:
     subject: str
     steps: int
     faults: Counter[str]
-    outcomes: Counter[tuple[str, InputSource]]
+    sources: Counter[tuple[str, InputSource]]
     bad_inputs: int
     unnamed: int
     lies: int
@@ -97,7 +97,7 @@ def _piece(name: str, steps: int, seed: int) -> FaultReport:
                 hindered, subject.plant, subject.x0, steps * mpc.dt,
                 dt=mpc.dt, seed=seed, sensors=hindered.sensors, watch=recorder.watch,
             )  # fmt: skip
-        failed = [k for k, o in enumerate(rollout.outcomes) if o is not InputSource.OPTIMAL]
+        failed = [k for k, o in enumerate(rollout.sources) if o is not InputSource.OPTIMAL]
         again = [replayed.is_exact for replayed in replay_all(mpc, file, failed)]
     return _judged(name, subject, faults, rollout, again)
 
@@ -114,11 +114,11 @@ def _judged(
         subject=name,
         steps=len(decisions),
         faults=Counter(fault.kind for fault in faults),
-        outcomes=Counter((kind, d.outcome) for kind, d in zip(kinds, decisions, strict=True)),
+        sources=Counter((kind, d.source) for kind, d in zip(kinds, decisions, strict=True)),
         bad_inputs=int((~np.isfinite(inputs) | (box.excess(inputs) > 0.0)).any(axis=1).sum()),
-        unnamed=sum(d.outcome is not InputSource.OPTIMAL and not d.message for d in decisions),
+        unnamed=sum(d.source is not InputSource.OPTIMAL and not d.message for d in decisions),
         lies=sum(
-            kind in NEVER_OPTIMAL and d.outcome is InputSource.OPTIMAL
+            kind in NEVER_OPTIMAL and d.source is InputSource.OPTIMAL
             for kind, d in zip(kinds, decisions, strict=True)
         ),
         slow=sum(_is_slow(rollout, fault.last + 1) for fault in faults),
@@ -130,5 +130,5 @@ def _judged(
 
 def _is_slow(rollout: Rollout, first: int) -> bool:
     """Whether none of the calm steps after a fault is optimal."""
-    after = rollout.outcomes[first : first + RECOVERY]
+    after = rollout.sources[first : first + RECOVERY]
     return len(after) == RECOVERY and InputSource.OPTIMAL not in after

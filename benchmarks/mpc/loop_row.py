@@ -26,7 +26,7 @@ class LoopRow:
         drift: largest task error [m].
         violation: the plant's largest violation.
         residual: the largest of all steps.
-        outcomes: decisions by rung.
+        sources: decisions by rung.
         statuses: decisions by how the solver ended.
         times: median, 99 % and worst time of a step [s].
         ended: why the loop ended early.
@@ -43,7 +43,7 @@ class LoopRow:
     drift: float
     violation: float
     residual: float | None
-    outcomes: dict[str, int]
+    sources: dict[str, int]
     statuses: dict[str, int]
     times: tuple[float, float, float]
     ended: str
@@ -76,7 +76,7 @@ class LoopRow:
             drift=rollout.drift,
             violation=rollout.violation,
             residual=residual if np.isfinite(residual) else None,
-            outcomes={o.name: count for o, count in rollout.counts.items() if count},
+            sources={o.name: count for o, count in rollout.counts.items() if count},
             statuses={name: statuses.count(name) for name in sorted(set(statuses))},
             times=(float(np.median(times)), float(np.quantile(times, 0.99)), float(times.max()))
             if len(times)
@@ -101,10 +101,15 @@ def read_loops(file: Path) -> tuple[LoopRow, ...]:
     """Return the rows of a file, the newest of each key."""
     if not file.exists():
         return ()
-    lines = file.read_text(encoding="utf-8").splitlines()
-    rows = [LoopRow(**{**(entry := json.loads(line)), "times": tuple(entry["times"])})
-            for line in lines]  # fmt: skip
+    rows = map(_row, file.read_text(encoding="utf-8").splitlines())
     return tuple({row.key: row for row in rows}.values())
+
+
+def _row(line: str) -> LoopRow:
+    entry = json.loads(line)
+    if "outcomes" in entry:  # as older files have it
+        entry["sources"] = entry.pop("outcomes")
+    return LoopRow(**{**entry, "times": tuple(entry["times"])})
 
 
 def found(rows: Sequence[LoopRow], case: str, controller: str, ending: str = "none") -> dict:

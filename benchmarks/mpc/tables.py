@@ -31,7 +31,7 @@ CELLS: Mapping[str, Callable[[LoopRow], str]] = {
     "violation": lambda row: f"{row.violation:.1e}",
     "settled [s]": lambda row: _number(row.settled, "{:.2f}"),
     "residual": lambda row: _number(row.residual, "{:.0e}"),
-    "outcomes": lambda row: _counts(row.outcomes),
+    "sources": lambda row: _counts(row.sources),
     "solver": lambda row: _counts(row.statuses),
     "median [ms]": lambda row: f"{1e3 * row.times[0]:.1f}",
     "99 %": lambda row: f"{1e3 * row.times[1]:.1f}",
@@ -51,7 +51,7 @@ def loops_table(rows: Sequence[LoopRow], title: str, columns: Sequence[str] = AR
     """
     table = Table(title=title)
     for name in columns:
-        table.add_column(escape(name), justify="right", no_wrap=name not in ("outcomes", "solver"))
+        table.add_column(escape(name), justify="right", no_wrap=name not in ("sources", "solver"))
     for row in rows:
         table.add_row(*(CELLS[name](row) for name in columns))
     return table
@@ -61,10 +61,10 @@ def faults_table(report: FaultReport) -> Table:
     """Return how many decisions came from which rung, by kind of fault."""
     verdict = "clean" if report.is_clean else "NOT CLEAN"
     table = Table(title=f"{report.subject}: {report.steps} steps, {verdict}")
-    for name in ("fault", "times", *(outcome.name.lower() for outcome in InputSource)):
+    for name in ("fault", "times", *(source.name.lower() for source in InputSource)):
         table.add_column(name, justify="right")
     for kind in ("none", *KINDS):
-        counts = [report.outcomes[kind, outcome] for outcome in InputSource]
+        counts = [report.sources[kind, source] for source in InputSource]
         table.add_row(kind, str(report.faults[kind] or ""), *(str(n or "") for n in counts))
     return table
 

@@ -122,7 +122,7 @@ class Racing:
             started = process_time()
             decision = mpc.step(measured, k * DT)
             self._times[key].append(process_time() - started)
-            is_new = decision.outcome in (InputSource.OPTIMAL, InputSource.FEASIBLE)
+            is_new = decision.source in (InputSource.OPTIMAL, InputSource.FEASIBLE)
             self._planned[key] += k >= _WARM and is_new
             rates.append(decision.input)
         self._x = self._x + DT * rates[0]

@@ -74,6 +74,11 @@ class _Timed(Solver):
     inner: Solver
     times: list[float] = field(default_factory=list)
 
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "_Timed":
+        """Set what is left open; see ``Solver``."""
+        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
+        return replace(self, inner=inner)
+
     def build(self, ocp: OCP) -> "_TimedProgram":
         return _TimedProgram(self.inner.build(ocp), self.times)
 

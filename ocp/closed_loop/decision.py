@@ -1,4 +1,4 @@
-"""What a controller decides at one instant, and what stands behind it."""
+"""What a controller decides at one step, and where the input comes from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -33,13 +33,15 @@ class StepReport:
     Attributes:
         t: when the state was measured [s].
         applies_at: from when on the input is meant to act [s].
-        status: how the solver ended at this step; None where it was not asked or raised.
-        message: why the outcome is not ``OPTIMAL``, in words.
+        status: how the solver ended at this step; None where it was not run, or raised.
+        message: why the input is not ``OPTIMAL``, in words.
         residual: the solver's optimality residual; inf without a plan of this step.
         late: whether a new plan came too late for this step.
         parameters: values of parameters and samples of signals of the horizon from
             ``applies_at`` on, by name, as the solver gets them.
         parameters_known: False where the controller's ``parameters`` failed; there are none then.
+        new_plan: made at this step and good for later ones, though it may be late for this one;
+            None where there is none.
         time_used: of this step [s].
     """
 
@@ -51,45 +53,46 @@ class StepReport:
     late: bool = False
     parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
     parameters_known: bool = True
+    new_plan: Solution | None = None
     time_used: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Decision(StepReport):
-    """An input that may be applied: finite, within its bounds, and named for what it is.
+    """The selected input, finite and within its bounds: of a new or shifted plan, or a backup.
 
     Attributes:
         input: what the plant receives (m,).
-        outcome: which rung it comes from.
+        source: which rung it comes from.
         plan: the plan that the input comes from; None for the backup law.
         age: steps since that plan was made, 0 for a new one.
         clipped: by how much the input was moved to lie within its bounds.
     """
 
     input: np.ndarray
-    outcome: InputSource
+    source: InputSource
     plan: Solution | None = None
     age: int = 0
     clipped: float = 0.0
 
 
 class ControlRefused(OCPError, RuntimeError):
-    """No input can be answered for: there is no usable plan, and no backup law that helps.
+    """There is no input to apply: no usable plan, and no backup law that helps.
 
     Args:
         message: why.
-        attempt: the step that was refused; None where a law refuses.
+        report: of the step that was refused; None where a law refuses.
     """
 
-    def __init__(self, message: str, attempt: StepReport | None = None) -> None:
+    def __init__(self, message: str, report: StepReport | None = None) -> None:
         """Keep the step."""
         super().__init__(message)
-        self.attempt = attempt
+        self.report = report
 
 
 @runtime_checkable
 class Controller(Protocol):
-    """Anything that decides an input from a measurement: ``MPC``, ``Law``."""
+    """Anything that decides an input from a measurement: ``MPC``, ``FeedbackLaw``."""
 
     @property
     def delay(self) -> float:
@@ -104,6 +107,6 @@ class Controller(Protocol):
         """Decide for a state x (nx,) measured at t [s].
 
         Raises:
-            ControlRefused: if no input can be answered for.
+            ControlRefused: if there is no input to apply.
         """
         ...

@@ -8,8 +8,8 @@ import numpy as np
 from ocp.checks.arguments import check_callable, check_instance, check_not_negative
 from ocp.closed_loop.decision import ControlRefused, Decision, InputSource
 from ocp.closed_loop.guarded_call import ControlLaw, guarded_call
-from ocp.closed_loop.shifted_plan import plan_controls
 from ocp.problem.constraint import Box
+from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 
 
@@ -17,7 +17,7 @@ from ocp.solution.solution import Solution
 class FeedbackLaw:
     """u = law(x, t), saturated: a gain matrix, instantaneous robot control, anything.
 
-    Its outcome is ``FEASIBLE``: nobody claims that it is optimal.
+    Its source is ``FEASIBLE``: it is not claimed to be optimal.
 
     Args:
         law: (x, t) -> input (m,).
@@ -59,7 +59,7 @@ class FeedbackLaw:
             t=t,
             applies_at=t + self.delay,
             input=self.bounds.clip(given),
-            outcome=InputSource.FEASIBLE,
+            source=InputSource.FEASIBLE,
             message="a control law, not a plan",
             clipped=float(self.bounds.excess(given).max(initial=0.0)),
             time_used=perf_counter() - started,

@@ -1,4 +1,4 @@
-"""What other people's code answers, when it may raise or return anything."""
+"""Call a user's function; turn its failures into ``ControlRefused``."""
 
 from collections.abc import Callable
 

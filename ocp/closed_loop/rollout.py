@@ -1,7 +1,6 @@
-"""What happened in a closed loop."""
+"""The record of a closed loop."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,19 +10,15 @@ import numpy as np
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.closed_loop.decision import Decision, InputSource
+from ocp.loop_plotting.loop_record import Draw, Progress
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.ocp import OCP
 from ocp.solution.archive import read_archive, write_archive
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# (axes, x (nx,), t [s]) -> the scene; (frames written, frames in all).
-Draw = Callable[["Axes", np.ndarray, float], object]
-Progress = Callable[[int, int], object]
-
-_OUTCOMES = tuple(InputSource)
+_SOURCES = tuple(InputSource)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -36,7 +31,7 @@ class Rollout:
         x: true states (K + 1, nx).
         measured: what the controller was told (K, nx).
         inputs: what acted in each interval (K, m); under a delay it was decided earlier.
-        outcomes: which rung each decision came from (K,).
+        sources: which rung each decision came from (K,).
         messages: why, where it was not the first (K,).
         costs: the plant's running cost over each interval (K,).
         violation: the plant's largest violation of a bound or constraint.
@@ -57,7 +52,7 @@ class Rollout:
     x: np.ndarray
     measured: np.ndarray
     inputs: np.ndarray
-    outcomes: tuple[InputSource, ...]
+    sources: tuple[InputSource, ...]
     messages: tuple[str, ...]
     costs: np.ndarray
     violation: float
@@ -70,7 +65,7 @@ class Rollout:
     late: int = 0
 
     def __repr__(self) -> str:
-        """Return one line: what was controlled, what it cost, and who decided."""
+        """Return one line: what was controlled, what it cost, and where the inputs came from."""
         return (
             f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
             f"violation {self.violation:.2g}, {self.decided_by}>"
@@ -84,7 +79,7 @@ class Rollout:
 
     def acting(self, k: int) -> InputSource | None:
         """The rung whose input acts in interval k; None where it was decided before t0."""
-        return self.outcomes[k - self.late] if k >= self.late else None
+        return self.sources[k - self.late] if k >= self.late else None
 
     @property
     def cost(self) -> float:
@@ -94,8 +89,8 @@ class Rollout:
     @property
     def counts(self) -> dict[InputSource, int]:
         """How many decisions came from each rung."""
-        found = Counter(self.outcomes)
-        return {outcome: found[outcome] for outcome in InputSource}
+        found = Counter(self.sources)
+        return {source: found[source] for source in InputSource}
 
     def or_raise(self) -> "Rollout":
         """Return self, or raise ``SolverError`` if the loop ended early."""
@@ -104,8 +99,8 @@ class Rollout:
         return self
 
     def plot(self) -> "Figure":
-        """Return a figure of states, inputs, outcomes and cost over time."""
-        from ocp.plotting.rollout import plot_rollout  # matplotlib takes a second
+        """Return a figure of states, inputs, their sources and cost over time."""
+        from ocp.loop_plotting.rollout import plot_rollout  # matplotlib takes a second
 
         return plot_rollout(self)
 
@@ -136,7 +131,7 @@ class Rollout:
             ProblemError: if there is nothing to show, there would be thousands of frames, or an
                 argument is out of its range.
         """
-        from ocp.plotting.animation import animate_rollout  # matplotlib takes a second
+        from ocp.loop_plotting.animation import animate_rollout  # matplotlib takes a second
 
         return animate_rollout(
             self,
@@ -151,7 +146,7 @@ class Rollout:
         """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
-            "outcomes": np.array([_OUTCOMES.index(o) for o in self.outcomes], dtype=int),
+            "outcomes": np.array([_SOURCES.index(o) for o in self.sources], dtype=int),
             "messages": np.array(self.messages, dtype=str),
             "plant": self.plant.name,
         }
@@ -173,13 +168,13 @@ class Rollout:
             raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
         if other := differing_in(data, plant):
             raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
-        if not np.isin(data["outcomes"], range(len(_OUTCOMES))).all():
-            raise ProblemError(f"{path} is no saved rollout: an outcome is none of the four")
+        if not np.isin(data["outcomes"], range(len(_SOURCES))).all():
+            raise ProblemError(f"{path} is no saved rollout: a source is none of the four")
         return cls(
             plant=plant,
             **{name: data[name] for name in _ARRAYS},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
-            outcomes=tuple(_OUTCOMES[i] for i in data["outcomes"]),
+            sources=tuple(_SOURCES[i] for i in data["outcomes"]),
             messages=tuple(map(str, data["messages"])),
         )
 

@@ -1,4 +1,4 @@
-"""The loop: measure, decide, apply, and write down."""
+"""The simulated loop: measure, decide, apply, record."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -44,14 +44,14 @@ def closed_loop(
     refuses, the rollout ends and says why.
 
     Args:
-        controller: ``MPC``, ``Law``, or whatever decides.
+        controller: ``MPC``, ``FeedbackLaw``, or any other ``Controller``.
         plant: the truth.
         x0: true first state (nx,).
         duration: [s], a multiple of dt up to rounding.
         dt: sampling interval [s].
         seed: of noise and jitter.
         initial_input: acts during the delay at the start (m,); default: zero, within bounds.
-        head_start: the controller is asked from t = -delay on, while the plant is kept at x0, so
+        head_start: the controller is run from t = -delay on, while the plant is kept at x0, so
             that its first input acts from t = 0 on. It should rest there under the initial input,
             or a delay that is compensated predicts what does not happen. These decisions are
             seen by ``watch``; those of the rollout begin at t = 0.
@@ -79,7 +79,7 @@ def closed_loop(
         first = check_numbers(initial_input, m, "closed loop: initial_input")
     controller.reset(first)
     late = delay_steps(controller.delay, dt)
-    journal = _Journal(plant.ocp, plant.started(x0, seed), late)
+    journal = _Journal.begun(plant.ocp, plant.started(x0, seed), late)
     ahead = [] if head_start else [first] * late
     for k in range(-late if head_start else 0, steps):
         measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
@@ -101,7 +101,7 @@ def closed_loop(
 def _decided(
     controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: Observer | None
 ) -> Decision:
-    """Ask the controller, and tell who watches what it says, or that it refuses."""
+    """Run one step of the controller, and pass its decision or refusal to ``watch``."""
     try:
         decision = controller.step(told, t)
     except ControlRefused as refusal:
@@ -120,13 +120,13 @@ def _decided(
 
 @dataclass(eq=False)
 class _Journal:
-    """A rollout while it is made."""
+    """What is recorded while a loop runs."""
 
     ocp: OCP
     running: RunningPlant
     late: int
-    t: list[float] = field(default_factory=list)
-    x: list[np.ndarray] = field(default_factory=list)
+    t: list[float]
+    x: list[np.ndarray]
     measured: list[np.ndarray] = field(default_factory=list)
     inputs: list[np.ndarray] = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
@@ -135,12 +135,13 @@ class _Journal:
     worst: str = ""
     ended: str = ""
 
-    def __post_init__(self) -> None:
-        self.t.append(self.running.t)
-        self.x.append(self.running.x)
+    @classmethod
+    def begun(cls, ocp: OCP, running: RunningPlant, late: int) -> "_Journal":
+        """Return the journal of a loop before its first step."""
+        return cls(ocp, running, late, [running.t], [running.x])
 
     def advance(self, told: np.ndarray, decision: Decision, acting: np.ndarray, dt: float) -> None:
-        """Let an input act for an interval, and write everything down."""
+        """Apply an input for an interval, and record it."""
         cost, excess, worst = self.running.advance(acting, dt)
         if excess > self.violation:
             self.violation, self.worst = excess, worst
@@ -152,7 +153,7 @@ class _Journal:
         self.x.append(self.running.x)
 
     def rollout(self) -> Rollout:
-        """Return it."""
+        """Return what was recorded."""
         t, x = np.array(self.t), np.array(self.x)
         m = self.ocp.model
         return Rollout(
@@ -161,7 +162,7 @@ class _Journal:
             x=x,
             measured=np.array(self.measured).reshape(-1, m.nx),
             inputs=np.array(self.inputs).reshape(-1, m.nu),
-            outcomes=tuple(d.outcome for d in self.decisions),
+            sources=tuple(d.source for d in self.decisions),
             messages=tuple(d.message for d in self.decisions),
             costs=np.array(self.costs),
             violation=self.violation,

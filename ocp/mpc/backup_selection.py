@@ -1,4 +1,4 @@
-"""Which law answers where no plan can: the user's, or the one that the problem suggests."""
+"""The backup law for steps without a usable plan: the user's, or what the problem suggests."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.errors import ProblemError, UnsupportedProblem
-from ocp.closed_loop.guarded_call import CALLBACK_ERRORS, ControlLaw
+from ocp.closed_loop.decision import ControlRefused
+from ocp.closed_loop.guarded_call import CALLBACK_ERRORS, ControlLaw, guarded_call
 from ocp.mpc.backup_laws import ParametricLaw, instantaneous, saturated_lqr
 from ocp.mpc.plant_input import PlantInput
 from ocp.problem.ocp import OCP
 
-# What a user may ask for: a law, one of two words, or None: rather refuse.
+# What a user may choose: a law, one of two words, or None: refuse.
 BackupOption = ControlLaw | Literal["default", "hold"] | None
 # (x, t, p) -> input (m,).
 BackupFunction = Callable[[np.ndarray, float, np.ndarray], ArrayLike]
@@ -32,7 +33,7 @@ class Backup:
     Attributes:
         name: of the law, in words.
         law: (x, t, p) -> input (m,); None: there is none.
-        holds: whether the last input is held where there is no law, or it has no answer.
+        holds: whether the last input is held where there is no law, or it fails.
         why: why the problem suggests no law, or not the first one.
     """
 
@@ -40,6 +41,35 @@ class Backup:
     law: BackupFunction | None
     holds: bool
     why: str = ""
+
+    def input(
+        self, x: np.ndarray, t: float, p: np.ndarray, *, size: int, last: np.ndarray | None
+    ) -> tuple[np.ndarray | None, str]:
+        """Return the input of the law, or the last one where it is held; None, and why.
+
+        Args:
+            x: state (nx,).
+            t: time [s].
+            p: parameters at that time (n_p,).
+            size: of the input, m.
+            last: the last input (m,), if there is one.
+        """
+        given, reason = (None, "") if self.law is None else self._by_law(self.law, x, t, p, size)
+        if given is not None or not self.holds:
+            return given, reason or "there is no backup law"
+        end = "there is no input to hold" if last is None else "backup: hold"
+        return last, f"{reason}; {end}" if reason else end
+
+    def _by_law(
+        self, law: BackupFunction, x: np.ndarray, t: float, p: np.ndarray, size: int
+    ) -> tuple[np.ndarray | None, str]:
+        try:
+            given = guarded_call(lambda x, t: law(x, t, p), "the backup law", x, t)
+        except ControlRefused as refusal:
+            return None, str(refusal)
+        if len(given) != size:
+            return None, f"the backup law returned {len(given)} numbers, not {size}"
+        return given, f"backup: {self.name}"
 
     def __repr__(self) -> str:
         """Name the law, and what else was tried."""

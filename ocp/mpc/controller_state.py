@@ -1,52 +1,69 @@
 """What a controller knows from earlier steps."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ocp.solution.solution import Solution
 
 
-@dataclass(frozen=True, eq=False)
-class ControllerState:
+class ControllerState(NamedTuple):
     """What a controller knows from earlier steps.
 
     Attributes:
-        plan: the last plan that was found good.
-        input: the last input.
+        steps_late: sampling intervals from a decision to its effect.
+        initial_input: acts until the first decision does (m,); None: unknown, or without a delay
+            there is none.
+        plan: the last plan that meets the constraints.
+        input: the last input; None before the first decision.
         pending: inputs that were decided but do not act yet, oldest first.
-        misses: solver runs in a row that brought no good plan.
+        misses: solver runs in a row without a plan that meets the constraints.
     """
 
-    plan: Solution | None = None
-    input: np.ndarray | None = None
-    pending: tuple[np.ndarray, ...] = ()
-    misses: int = 0
+    steps_late: int
+    initial_input: np.ndarray | None
+    plan: Solution | None
+    input: np.ndarray | None
+    pending: tuple[np.ndarray, ...]
+    misses: int
+
+    @classmethod
+    def at_start(cls, steps_late: int, acting: np.ndarray | None) -> "ControllerState":
+        """Return what is known before the first step, ``acting`` being the input until then."""
+        # Without a delay the first decision acts at once.
+        initial = acting if steps_late else None
+        pending = () if acting is None else (acting,) * steps_late
+        return cls(steps_late, initial, None, None, pending, 0)
+
+    @property
+    def last_input(self) -> np.ndarray | None:
+        """The last input: decided, or acting until the first decision does."""
+        return self.initial_input if self.input is None else self.input
 
     @property
     def cold_start(self) -> bool:
-        """Whether the solver should not start from the last plan, which may be what misleads it.
+        """Whether the solver should not start from the last plan, which may mislead it.
 
-        One failure may be an accident, and a start afresh may lead elsewhere; after two, every
-        other run starts afresh.
+        One failure may be an accident, and a cold start may lead elsewhere; after two, every
+        other run starts cold.
         """
         return self.misses > 0 and self.misses % 2 == 0
 
     def after(
-        self, given: np.ndarray | None, plan: Solution | None, steps_late: int, *, tried: bool
+        self, given: np.ndarray | None, new_plan: Solution | None, *, solver_ran: bool
     ) -> "ControllerState":
-        """Return what is known after a step: its input, and its plan if there is a good one.
+        """Return what is known after a step.
 
         Args:
             given: the input; None where the step was refused.
-            plan: may have come too late for the step.
-            steps_late: from a decision to its effect.
-            tried: whether the solver was run.
+            new_plan: made at this step, meets the constraints; it may be late for the step.
+            solver_ran: whether the solver was run.
         """
-        misses = 0 if plan else self.misses + tried
+        plan = new_plan or self.plan
+        misses = 0 if new_plan else self.misses + solver_ran
+        late, initial = self.steps_late, self.initial_input
         if given is None:
-            return ControllerState(plan or self.plan, self.input, self.pending, misses)
+            return ControllerState(late, initial, plan, self.input, self.pending, misses)
         ahead = (*self.pending, given)
-        return ControllerState(
-            plan or self.plan, given, ahead[max(0, len(ahead) - steps_late) :], misses
-        )
+        pending = ahead[max(0, len(ahead) - late) :]
+        return ControllerState(late, initial, plan, given, pending, misses)

@@ -1,4 +1,4 @@
-"""The flight recorder: every step on disk as it happens, and any of them played again."""
+"""The flight recorder: every step on disk as it happens, and any of them decided again."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import BinaryIO, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError
@@ -21,8 +22,8 @@ class FlightRecorder:
     """Writes a record after every step of an ``MPC``, whether it was decided or refused.
 
     The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
-    the shapes of its arrays, these as doubles (what was measured, the input, the plan where
-    another one was found good, the parameters), and the message. A record that was cut off by a
+    the shapes of its arrays, these as doubles (what was measured, the input, the step's new
+    plan if there is one, the parameters), and the message. A record that was cut off by a
     crash is ignored later. Use it as a context manager and give its ``watch`` to the loop. A record
     begins with a controller that knows nothing yet: a loop resets it; else call ``reset``.
 
@@ -39,7 +40,6 @@ class FlightRecorder:
         check_instance(mpc, MPC, "flight recorder: mpc")
         check_instance(path, (str, Path), "the path of a flight record")
         self._mpc, self.path = mpc, Path(path)
-        self._last: Solution | None = None
         self._file: BinaryIO = opened(path, "wb", "flight record")
         self._begun, self._t = False, -np.inf
 
@@ -62,7 +62,7 @@ class FlightRecorder:
         Raises:
             ProblemError: if it is a step of another run, or of a controller that is no ``MPC``.
         """
-        step = decided.attempt if isinstance(decided, ControlRefused) else decided
+        step = decided.report if isinstance(decided, ControlRefused) else decided
         if step is None:
             raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
         if not self._begun:
@@ -70,16 +70,14 @@ class FlightRecorder:
         if step.t < self._t:
             raise ProblemError(f"{self.path}: t goes back to {step.t:g} s; a record is of one run")
         self._t = step.t
-        plan = self._mpc.memory.plan
-        self._file.write(packed(measured, step, plan if plan is not self._last else None))
+        self._file.write(packed(measured, step))
         self._file.flush()
-        self._last = plan
 
     def _begin(self) -> None:
         """Write the first line: only the loop tells the controller what acts at first."""
         mpc, self._begun = self._mpc, True
-        names = [entry.name for entry in mpc.ocp.parameters]
-        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names, mpc.acting))
+        names, acting = [entry.name for entry in mpc.ocp.parameters], mpc.state.initial_input
+        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names, acting))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +94,10 @@ class Replay:
 
     @property
     def is_exact(self) -> bool:
-        """Whether input (to the last bit) and outcome are the recorded ones, or it is refused."""
+        """Whether input (to the last bit) and source are the recorded ones, or it is refused."""
         if self.decision is None or self.record.input is None:
             return self.decision is None and self.record.input is None
-        return self.decision.outcome is self.record.outcome and np.array_equal(
+        return self.decision.source is self.record.source and np.array_equal(
             self.decision.input, self.record.input
         )
 
@@ -132,42 +130,33 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
     for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
         if said[name] != own:
             raise ProblemError(f"{path} records the {name} '{said[name]}', not '{own}'")
-    wanted, known = set(steps), _Known()
-    again = replace(mpc, parameters=known)
+    wanted, again = set(steps), replace(mpc, parameters=_unknown)
     again.reset(said.get("acting"))
-    memory = again.memory
+    state = again.state
     for k, record in enumerate(records(path)):
         if not wanted:
             return
-        # The state of a solver comes from all the steps before.
+        # A stateful solver has to run at all the steps before.
         if k in wanted or again.is_stateful:
-            again.memory, known.record = memory, record
+            again.state = state
             found = Replay(record, _again(again, record))
             if k in wanted:
                 wanted.remove(k)
                 yield found
-        memory = memory.after(
-            record.input, _plan(mpc, record), mpc.steps_late, tried=record.is_solvable
-        )
+        state = state.after(record.input, _plan(mpc, record), solver_ran=record.is_solvable)
     if wanted:
         raise ProblemError(f"{path} has no step {min(wanted)}")
 
 
-@dataclass(eq=False)
-class _Known:
-    """The parameters as they were known at a recorded step, instead of the controller's own."""
-
-    record: Record | None = None
-
-    def __call__(self, t: float) -> Mapping[str, np.ndarray]:
-        if self.record is None or not self.record.parameters_known:
-            raise ProblemError("nobody knew them")
-        return self.record.parameters
+def _unknown(t: float) -> Mapping[str, ArrayLike]:
+    """Stand for the controller's ``parameters``, which failed at a recorded step."""
+    raise ProblemError("they were not known at the recorded step")
 
 
 def _again(mpc: MPC, record: Record) -> Decision | None:
+    known = record.parameters if record.parameters_known else None
     try:
-        return mpc.step(record.measured, record.t, late=record.late)
+        return mpc.step(record.measured, record.t, late=record.late, parameters=known)
     except ControlRefused:
         return None
 

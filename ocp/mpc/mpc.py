@@ -1,12 +1,9 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
-from time import perf_counter
-from typing import Any
+from math import inf
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import (
@@ -14,30 +11,23 @@ from ocp.checks.arguments import (
     check_instance,
     check_not_negative,
     check_numbers,
-    check_numeric,
     check_positive,
-    check_real,
 )
 from ocp.checks.errors import ProblemError, UnsupportedProblem
-from ocp.closed_loop.decision import ControlRefused, Decision, StepReport
+from ocp.closed_loop.decision import ControlRefused, Decision
 from ocp.closed_loop.delay import delay_steps
-from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import Observer, closed_loop
 from ocp.mpc.backup_selection import Backup, BackupOption, select_backup
 from ocp.mpc.controller_state import ControllerState
-from ocp.mpc.fallback_ladder import FallbackLadder
+from ocp.mpc.fallback_ladder import FallbackLadder, Parameters
 from ocp.mpc.plant_input import PlantInput
-from ocp.mpc.solver_options import with_mpc_defaults
-from ocp.mpc.step_inputs import StepInputs
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import ParameterValues
-from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Solver
-from ocp.solution.status import Status
 
-Parameters = Callable[[float], Mapping[str, ArrayLike]]
+# What a run may take where a solver sets no limit [s]: far more than a control loop has.
+_TIME_LIMIT = 10.0
 
 
 @dataclass(eq=False, kw_only=True)
@@ -56,11 +46,11 @@ class MPC:
     3. the ``backup`` law, ``BACKUP``;
     4. ``ControlRefused``.
 
-    Where two runs of the solver in a row bring no good plan, every other one starts afresh, as the
-    first step does, since the last plan may be what leads it astray.
+    After two runs of the solver in a row without a plan that meets the constraints, every other one
+    starts cold, as the first step does, since the last plan may mislead it.
 
-    An answer that took longer than ``budget`` came too late for its step: it is not applied
-    but remembered, and the next rungs see it as the last plan. Source: thesis Algorithm 3,
+    A plan that took longer than ``budget`` is too late for its step: it is not applied, but kept
+    as the last plan of later steps. Source: thesis Algorithm 3,
     2.2.1; [Mayne et al. 2000].
 
     Args:
@@ -90,6 +80,7 @@ class MPC:
 
     Attributes:
         backup_law: the law in force, and why the problem suggests no other.
+        state: what is known from earlier steps; it may be kept and set again.
 
     Raises:
         ProblemError: if interval, delay, budget, backup or bounds do not fit the problem.
@@ -109,21 +100,33 @@ class MPC:
     budget: float | None = None
     tolerance: float = 1e-6
     compiled: bool = True
+    # Built from the options above.
     backup_law: Backup = field(init=False)
+    _ladder: FallbackLadder = field(init=False, repr=False)
+    # The only part that a step changes.
+    state: ControllerState = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the numbers, and do all symbolic work."""
+        """Check the options, do all symbolic work, and begin without a plan."""
         self._check()
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
-        self.steps_late = delay_steps(self.delay, self.dt)
         self.reset()
-        self._ladder = FallbackLadder(
+        self._ladder = self._built()
+
+    def _built(self) -> FallbackLadder:
+        solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
+        return FallbackLadder(
             ocp=self.ocp,
-            program=with_mpc_defaults(self.solver, compiled=self.compiled).build(self.ocp),
+            program=solver.build(self.ocp),
+            duration=self.ocp.duration,
+            dt=self.dt,
             applied=self.applied,
             backup=self.backup_law,
+            parameters=self.parameters,
             guess=self.guess,
-            dt=self.dt,
+            delay=self.delay,
+            compensate=self.compensate,
+            budget=inf if self.budget is None else self.budget,
             tolerance=self.tolerance,
             compiled=self.compiled,
         )
@@ -153,7 +156,7 @@ class MPC:
 
     @property
     def is_stateful(self) -> bool:
-        """Whether the solver's own answers depend on the runs before."""
+        """Whether a solution depends on the solver's earlier runs, other than by the guess."""
         return self._ladder.program.is_stateful
 
     def reset(self, acting: ArrayLike | None = None) -> None:
@@ -165,9 +168,7 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        # Without a delay the first decision acts at once.
-        self.acting = first if self.steps_late else None
-        self.memory = ControllerState(pending=() if first is None else (first,) * self.steps_late)
+        self.state = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
 
     def step(
         self,
@@ -182,7 +183,7 @@ class MPC:
         Args:
             x: measured state (nx,); NaN is a missing measurement.
             t: when it was measured [s].
-            late: whether the answer counts as late; default: by the clock.
+            late: whether the new plan is late for this step; default: by the clock and ``budget``.
             parameters: of the horizon that starts when the input acts, by name; default: what
                 the controller's own ``parameters`` say.
 
@@ -190,34 +191,10 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        started = perf_counter()
-        moment = self._moment(x, t, parameters)
-        ladder = self._ladder
-        plan, status = ladder.solve(moment)
-        used = perf_counter() - started
-        if late is None:
-            late = self.budget is not None and used > self.budget
-        late = late and plan is not None
-        if late:
-            moment.reasons.append(f"the answer came after {used:.3g} s, too late for its step")
-        new = ladder.new(moment, plan) if plan is not None and not late else None
-        choice = new or ladder.shifted(moment) or ladder.backed_up(moment, self._last)
-        good = plan if late or new is not None else None
-        self.memory = self.memory.after(
-            choice and choice.input, good, self.steps_late, tried=moment.is_solvable
-        )
-        said = _account(moment, plan, status, late, perf_counter() - started)
-        if choice is None:
-            raise ControlRefused(f"t = {t:g} s: {said['message']}", StepReport(**said))
-        followed = choice.plan
-        return Decision(
-            **said,
-            input=choice.input,
-            outcome=choice.outcome,
-            plan=followed,
-            age=round((moment.at - followed.t[0]) / self.dt) if followed and not new else 0,
-            clipped=choice.clipped,
-        )
+        report, self.state = self._ladder.step(self.state, x, t, late=late, parameters=parameters)
+        if not isinstance(report, Decision):
+            raise ControlRefused(f"t = {t:g} s: {report.message}", report)
+        return report
 
     def run(
         self,
@@ -244,80 +221,3 @@ class MPC:
                     f"has {theirs}"
                 )
         return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
-
-    @property
-    def _last(self) -> np.ndarray | None:
-        """The last input: decided, or acting until the first decision does."""
-        return self.acting if self.memory.input is None else self.memory.input
-
-    def _moment(
-        self, x: ArrayLike, t: float, parameters: Mapping[str, ArrayLike] | None
-    ) -> StepInputs:
-        """Collect what a decision is made from."""
-        name, plan = self.ocp.name, self.memory.plan
-        at, state = (
-            check_real(t, f"MPC of {name}: t [s]") + self.delay,
-            check_numeric(x, f"MPC of {name}: x"),
-        )
-        if state.shape != (self.ocp.model.nx,):
-            raise ProblemError(
-                f"MPC of {name}: x has shape {state.shape}, ({self.ocp.model.nx},) is needed"
-            )
-        values, why = self._informed(at, parameters)
-        since = plan.t[0] if why and plan else at
-        is_measured = all(map(isfinite, state.tolist()))
-        if not is_measured:  # without a plan the backup law sees what was measured
-            state = state if plan is None else plan.state(at)
-        elif self.compensate and self.memory.pending:
-            state = self._predicted(state, t, values.at((at - since) / self.ocp.duration)[0])
-        return StepInputs(
-            t=float(t),
-            at=at,
-            start=state,
-            is_measured=is_measured,
-            plan=plan,
-            values=values,
-            parameters=values.as_dict(),
-            since=since,
-            parameters_known=not why,
-            cold_start=self.memory.cold_start,
-            reasons=why,
-        )
-
-    def _informed(
-        self, at: float, given: Mapping[str, ArrayLike] | None
-    ) -> tuple[ParameterValues, list[str]]:
-        """Return the parameters of a horizon, or those of the last plan and why."""
-        if given is not None or self.parameters is None:
-            return self.ocp.parameter_values(given), []
-        try:
-            return self.ocp.parameter_values(self.parameters(at)), []
-        except CALLBACK_ERRORS as error:
-            if self.memory.input is None:  # nothing has moved yet: let it be mended
-                raise
-            known = self.memory.plan.parameters if self.memory.plan else None
-            why = f"no parameters from t = {at:g} s on: {error}"
-            return self.ocp.parameter_values(known), [why]
-
-    def _predicted(self, x: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
-        """Return the state after the delay, under the inputs that are on their way."""
-        for k, given in enumerate(self.memory.pending):
-            x = self._ladder.advanced(x, given, t + k * self.dt, p)
-        return x
-
-
-def _account(
-    moment: StepInputs, plan: Solution | None, status: Status | None, late: bool, used: float
-) -> dict[str, Any]:
-    """Return what is said of a step whatever came of it, by the names of ``StepReport``."""
-    return {
-        "t": moment.t,
-        "applies_at": moment.at,
-        "status": status,
-        "message": "; ".join(moment.reasons),
-        "residual": plan.residual if plan else np.inf,
-        "late": late,
-        "parameters": moment.parameters if moment.parameters_known else {},
-        "parameters_known": moment.parameters_known,
-        "time_used": used,
-    }

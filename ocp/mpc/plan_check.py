@@ -1,15 +1,17 @@
 """What a plan would do from now on: run the model under it, and check the constraints."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
+from typing import NamedTuple
 
 import numpy as np
 
 from ocp.closed_loop.model_rollout import IntervalParameters, ModelRollout
-from ocp.closed_loop.shifted_plan import plan_controls
-from ocp.mpc.step_inputs import StepInputs
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import ParameterValues
+from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 from ocp.solution.status import Status
 
@@ -31,6 +33,32 @@ _ROUNDING = 1e-6
 _NO_PARAMETERS = np.empty(0)
 
 
+class HorizonParameters(NamedTuple):
+    """Parameters and signals of one horizon, read at absolute times.
+
+    Attributes:
+        values: the numbers.
+        by_name: the same, as a solver takes them.
+        start: of the horizon [s].
+        duration: of the horizon [s].
+    """
+
+    values: ParameterValues
+    by_name: Mapping[str, np.ndarray]
+    start: float
+    duration: float
+
+    def at(self, t: float) -> np.ndarray:
+        """Return all of them at t [s], stacked (n_p,)."""
+        if not self.values.entries:
+            return _NO_PARAMETERS
+        return self.values.at((t - self.start) / self.duration)[0]
+
+    def between(self, times: np.ndarray) -> IntervalParameters:
+        """Return those at both ends of the intervals between instants (N + 1,) [s]."""
+        return self.values.on((times - self.start) / self.duration)
+
+
 @dataclass(frozen=True, eq=False)
 class PlanCheck:
     """The controller's model, run ahead.
@@ -44,57 +72,54 @@ class PlanCheck:
     ocp: OCP
     dt: float
     compiled: bool
-    _rehearsals: dict[int, ModelRollout] = field(default_factory=dict)
+    # By the number of intervals: a roll-out is prepared once for each.
+    _rollouts: dict[int, ModelRollout] = field(default_factory=dict)
 
-    def excess(self, plan: Solution, moment: StepInputs) -> tuple[float, str]:
-        """Return by how much a new plan violates the constraints; inf where it is none."""
+    def new_plan(
+        self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> tuple[float, str]:
+        """Return by how much a plan from a state ``start`` at t [s] violates the constraints.
+
+        A converged plan is checked as it is; another one by running the model under its controls.
+        Infinite where the solver's status says that there is no plan.
+        """
         if plan.status.is_success:
             if not self._is_constrained:
                 return 0.0, ""
-            u, ends = plan_controls(plan, plan.t[:-1]), self._ends(moment, plan.t)
-            return self._rehearsal(len(u)).excess(plan.x, u, plan.t, ends)
+            u = plan_controls(plan, plan.t[:-1])
+            return self._rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
         if plan.status not in _USABLE:
             return np.inf, plan.status.value
-        return self.remaining(plan, moment)
+        return self.remainder(plan, start, t, p)
 
-    def remaining(self, plan: Solution, moment: StepInputs) -> tuple[float, str]:
-        """Run the model from now under what is left of a plan, and check the constraints.
+    def remainder(
+        self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> tuple[float, str]:
+        """Run the model from t [s] under what is left of a plan, and check the constraints.
 
-        Those of the end are asked of a whole plan only: a remainder ends before its horizon.
+        Those of the end are checked for a whole plan only: a remainder ends before its horizon.
         """
-        times = moment.at + plan.t - plan.t[0]
+        times = t + plan.t - plan.t[0]
         left = int((times[:-1] < plan.t[-1] - _ROUNDING * self.dt).sum())
         if not left:
             return np.inf, "nothing is left of it"
         times = times[: left + 1]
-        u, rehearsal = plan_controls(plan, times[:-1]), self._rehearsal(left)
-        trial = rehearsal.of(moment.start, u, times, self._ends(moment, times))
-        found = trial.excess, trial.worst
-        if left < len(plan.t) - 1 or not isfinite(trial.excess):
+        u, model = plan_controls(plan, times[:-1]), self._rollout(left)
+        result = model.of(start, u, times, p.between(times))
+        found = result.excess, result.worst
+        if left < len(plan.t) - 1 or not isfinite(result.excess):
             return found
-        p = self.parameters(moment, times[-1])
-        return max(found, rehearsal.end_excess(trial.x[-1], times[-1], p))
+        return max(found, model.end_excess(result.x[-1], times[-1], p.at(times[-1])))
 
-    def advanced(self, x: np.ndarray, u: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
+    def next_state(self, x: np.ndarray, u: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the state one interval after t [s] under a control, parameters held."""
         times, ends = np.array([t, t + self.dt]), (p[None, :], p[None, :])
-        return self._rehearsal(1).of(x, u[None, :], times, ends).x[-1]
+        return self._rollout(1).of(x, u[None, :], times, ends).x[-1]
 
-    def parameters(self, moment: StepInputs, t: float) -> np.ndarray:
-        """Return the parameters at an instant (n_p,)."""
-        if not self.ocp.parameters:
-            return _NO_PARAMETERS
-        return moment.values.at((t - moment.since) / self.ocp.duration)[0]
-
-    def _ends(self, moment: StepInputs, times: np.ndarray) -> IntervalParameters:
-        """Return the parameters at both ends of the intervals between some instants (N + 1,)."""
-        return moment.values.on((times - moment.since) / self.ocp.duration)
-
-    def _rehearsal(self, n: int) -> ModelRollout:
-        """Roll-outs over n intervals, prepared once for each n."""
-        if n not in self._rehearsals:
-            self._rehearsals[n] = ModelRollout(self.ocp, n, self.compiled)
-        return self._rehearsals[n]
+    def _rollout(self, n: int) -> ModelRollout:
+        if n not in self._rollouts:
+            self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled)
+        return self._rollouts[n]
 
     @cached_property
     def _is_constrained(self) -> bool:

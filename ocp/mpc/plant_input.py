@@ -46,13 +46,19 @@ class PlantInput:
         """Return the bounds of the input, each (m,).
 
         Raises:
-            ProblemError: if they do not fit, or a rate is asked of a discrete-time model.
+            ProblemError: if they do not fit, or a discrete-time model is to send a rate.
         """
         if self.what == "control":
             return ocp.control_bounds
         if ocp.model.is_discrete:
             raise ProblemError(f"{ocp.name}: a discrete-time model has no rate to apply")
         return (self.bounds or Box()).sized(ocp.model.nx, f"{ocp.name}: bounds of the rate")
+
+    def limits(self, ocp: OCP) -> tuple[list[float], list[float]]:
+        """Return the bounds as numbers, finite where there is none: inf is outside of them."""
+        largest, box = np.finfo(float).max, self.box(ocp)
+        lower, upper = (np.clip(side, -largest, largest) for side in (box.lower, box.upper))
+        return lower.tolist(), upper.tolist()
 
     def sending(self, ocp: OCP) -> InputMap:
         """Return what makes an input of a state and a control of the problem."""

@@ -11,18 +11,18 @@ import numpy as np
 from ocp.checks.errors import ProblemError
 from ocp.closed_loop.decision import Decision, InputSource, StepReport
 from ocp.solution.archive import opened
-from ocp.solution.solution import ControlKind, Solution
+from ocp.solution.solution import ControlKind
 from ocp.solution.status import Status
 
 _FORMAT = "flight record, version 3"  # the enums below belong to it
-# Bytes that follow; t, residual, clipped, time used; age; outcome, status, late, informed,
+# Bytes that follow; t, residual, clipped, time used; age; source, status, late, informed,
 # kind and status of the plan, number of arrays.
 _HEAD = Struct("<I4di7B")
 _SHAPE = Struct("<2i")
 # Instead of the number of columns: the array has one axis.
 _VECTOR = -1
 # A place in one of these is a byte of the head; the first entry of each: there is none.
-_OUTCOMES: tuple[InputSource | None, ...] = (None, *InputSource)
+_SOURCES: tuple[InputSource | None, ...] = (None, *InputSource)
 _STATUSES: tuple[Status | None, ...] = (None, *Status)
 _KINDS: tuple[ControlKind | None, ...] = (
     None,
@@ -54,14 +54,14 @@ class Record(NamedTuple):
 
     Attributes:
         t: when the state was measured [s].
-        outcome: which rung the input came from; None where the step was refused.
+        source: which rung the input came from; None where the step was refused.
         status: how the solver ended.
-        message: why the outcome is not ``OPTIMAL``.
+        message: why the input is not ``OPTIMAL``.
         measured: what the controller was told (nx,).
         input: what was sent (m,); None where the step was refused.
         parameters: as they were known.
-        plan: that was found good at this step, if there is one.
-        late: whether the answer of the solver came too late.
+        plan: the new plan of this step, if there is one.
+        late: whether the new plan came too late for the step.
         parameters_known: whether the parameters were known.
         residual: of the solver.
         clipped: by how much the input was clipped.
@@ -70,7 +70,7 @@ class Record(NamedTuple):
     """
 
     t: float
-    outcome: InputSource | None
+    source: InputSource | None
     status: Status | None
     message: str
     measured: np.ndarray
@@ -104,8 +104,9 @@ def header(
     return json.dumps(said).encode() + b"\n"
 
 
-def packed(measured: np.ndarray, step: StepReport, plan: Solution | None) -> bytes:
-    """Return a step, its measurement and the plan that was found good at it as bytes."""
+def packed(measured: np.ndarray, step: StepReport) -> bytes:
+    """Return a step, with its measurement and new plan, as bytes."""
+    plan = step.new_plan
     decision = step if isinstance(step, Decision) else None
     arrays = [measured]
     if decision:
@@ -128,7 +129,7 @@ def packed(measured: np.ndarray, step: StepReport, plan: Solution | None) -> byt
         decision.clipped if decision else 0.0,
         step.time_used,
         decision.age if decision else 0,
-        _OUTCOMES.index(decision.outcome if decision else None),
+        _SOURCES.index(decision.source if decision else None),
         _STATUSES.index(step.status),
         step.late,
         step.parameters_known,
@@ -171,19 +172,19 @@ def records(path: str | Path) -> Iterator[Record]:
 
 
 def _unpacked(head: bytes, body: bytes, names: Sequence[str]) -> Record:
-    (_, t, residual, clipped, time_used, age, outcome, status, late, informed, kind, made, count
+    (_, t, residual, clipped, time_used, age, source, status, late, informed, kind, made, count
      ) = _HEAD.unpack(head)  # fmt: skip
     arrays, end = _arrays(body, count)
     rest = iter(arrays)
     measured = next(rest)
-    sent = next(rest) if outcome else None
+    sent = next(rest) if source else None
     plan = None
     if kind:
         own = [next(rest) for _ in _ARRAYS]
         plan = Plan(_KINDS[kind], _STATUSES[made], *own)  # pyright: ignore[reportArgumentType]
     return Record(
         t=t,
-        outcome=_OUTCOMES[outcome],
+        source=_SOURCES[source],
         status=_STATUSES[status],
         message=body[end:].decode(),
         measured=measured,

@@ -1,1 +1,1 @@
-"""Figures and films of solutions and closed loops."""
+"""Figures of solutions; they take what they draw by structure."""

@@ -72,6 +72,18 @@ class Solver(ABC):
             UnsupportedProblem: naming the term that this method cannot treat.
         """
 
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Solver":
+        """Return the solver as ``MPC`` runs it; here as it is.
+
+        A method that can run machine code or has a ``time_limit`` replaces these options, and one
+        around another solver passes the call on.
+
+        Args:
+            compiled: whether to run machine code; where not, the option stays as it is.
+            time_limit: of a run where the option is left open [s].
+        """
+        return self
+
 
 def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
     """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.

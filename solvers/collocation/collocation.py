@@ -1,6 +1,6 @@
 """Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -92,6 +92,11 @@ class Collocation(Solver):
             verbose=self.verbose,
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Collocation":
+        """Set what is left open; see ``Solver``."""
+        limit = time_limit if self.time_limit is None else self.time_limit
+        return replace(self, time_limit=limit)
 
     def build(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.

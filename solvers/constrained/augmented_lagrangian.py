@@ -1,7 +1,7 @@
 """The augmented Lagrangian: constraints for solvers that take none, met between the nodes too."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -83,6 +83,11 @@ class AugmentedLagrangian(Solver):
             raise ProblemError(f"augmented Lagrangian: growth = {self.growth}, it must exceed 1")
         for name in ("tolerance", "complementarity"):
             check_positive(getattr(self, name), f"augmented Lagrangian: {name}", finite=False)
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "AugmentedLagrangian":
+        """Set what is left open; see ``Solver``."""
+        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
+        return replace(self, inner=inner)
 
     def build(self, ocp: OCP) -> "AugmentedLagrangianProgram":
         """Relax the problem and let the inner solver build that.

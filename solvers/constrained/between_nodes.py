@@ -61,6 +61,11 @@ class BetweenNodes(Solver):
         check_whole(self.max_rounds, "between nodes: max_rounds")
         check_positive(self.tolerance, "between nodes: tolerance", finite=False)
 
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "BetweenNodes":
+        """Set what is left open; see ``Solver``."""
+        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
+        return replace(self, inner=inner)
+
     def build(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.
 

@@ -1,6 +1,6 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -77,6 +77,11 @@ class MultipleShooting(Solver):
             verbose=self.verbose,
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "MultipleShooting":
+        """Set what is left open; see ``Solver``."""
+        limit = time_limit if self.time_limit is None else self.time_limit
+        return replace(self, compiled=compiled or self.compiled, time_limit=limit)
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

@@ -1,6 +1,6 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -91,6 +91,10 @@ class Schuetz(Solver):
             max_iterations=max_iterations,
             decrease=0.0,
         )
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Schuetz":
+        """Set what is left open; see ``Solver``."""
+        return replace(self, compiled=True) if compiled else self
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""

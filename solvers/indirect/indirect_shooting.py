@@ -1,6 +1,6 @@
 """Indirect shooting: Newton-Raphson on the minimum principle's boundary value problem."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -84,6 +84,10 @@ class IndirectShooting(Solver):
             raise ProblemError(
                 f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
             )
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "IndirectShooting":
+        """Set what is left open; see ``Solver``."""
+        return replace(self, compiled=True) if compiled else self
 
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""

@@ -15,7 +15,7 @@ from benchmarks.mpc.faults import FaultReport
 from benchmarks.mpc.loop_row import read_loops
 
 CLEAN = FaultReport(
-    subject="cart", steps=10, faults=Counter(), outcomes=Counter(), bad_inputs=0, unnamed=0,
+    subject="cart", steps=10, faults=Counter(), sources=Counter(), bad_inputs=0, unnamed=0,
     lies=0, slow=0, refused=0, replayed=3, differing=0,
 )  # fmt: skip
 

@@ -299,7 +299,7 @@ def test_plans_of_a_loop_replay_to_the_last_bit(tmp_path: Path) -> None:
     mpc = MPC(ocp=cart(), solver=Collocation(5, 3), dt=0.1)
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(Plant(ocp=cart()), [1.0, 0.0], 0.5, watch=recorder.watch)
-    assert all(outcome is InputSource.OPTIMAL for outcome in rollout.outcomes)
+    assert all(source is InputSource.OPTIMAL for source in rollout.sources)
     assert all(replay(mpc, tmp_path / "flight", k).is_exact for k in range(5))
 
 

@@ -92,7 +92,7 @@ def test_a_short_horizon_stays_feasible(form):
         if run.ended:
             assert not len(run.inputs), "if it refuses, then at once"
             continue
-        assert set(run.outcomes) == {InputSource.OPTIMAL}
+        assert set(run.sources) == {InputSource.OPTIMAL}
         assert np.abs(run.x[1:, 0]).max() <= BOUND + 1e-7
         assert np.abs(run.inputs).max() <= FORCE
         assert np.abs(run.x[-1]).max() < 0.05 * max(1.0, np.abs(x0).max())
@@ -103,8 +103,8 @@ def test_a_short_horizon_stays_feasible(form):
 def test_without_it_a_short_horizon_runs_into_a_dead_end():
     start = np.array([1.0, 3.3])
     run = MPC(ocp=regulator(4), solver=LinearMPC(), dt=DT).run(Plant(ocp=regulator()), start, 1.0)
-    assert run.outcomes[0] is InputSource.OPTIMAL
-    lost = next(d for d in run.decisions if d.outcome is not InputSource.OPTIMAL)
+    assert run.sources[0] is InputSource.OPTIMAL
+    lost = next(d for d in run.decisions if d.source is not InputSource.OPTIMAL)
     assert lost.status is Status.INFEASIBLE
     assert "bound of position" in lost.message
     assert run.violation > 0.01, "no rung of the ladder leads out of a dead end"

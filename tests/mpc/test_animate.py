@@ -9,7 +9,7 @@ from PIL import Image, ImageSequence
 
 from models import PlanarArm, line, redundancy_ocp
 from ocp import MPC, Box, FeedbackLaw, Plant, PlantInput, ProblemError, Rollout, closed_loop
-from ocp.plotting.animation import _controls_ahead, _sends_controls, _states_ahead
+from ocp.loop_plotting.animation import _controls_ahead, _sends_controls, _states_ahead
 from solvers import IndirectShooting, MultipleShooting
 from tests.mpc.problems import cart
 

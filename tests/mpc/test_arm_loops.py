@@ -43,7 +43,7 @@ def test_every_ending_is_a_problem(kind: str) -> None:
 def row(horizon: float, cost: float | None, controller: str = "direct") -> LoopRow:
     return LoopRow(
         case=NAME, controller=controller, horizon=horizon, part=cost, cost=cost, drift=0.0,
-        violation=0.0, residual=None, outcomes={}, statuses={}, times=(0.0, 0.0, 0.0), ended="",
+        violation=0.0, residual=None, sources={}, statuses={}, times=(0.0, 0.0, 0.0), ended="",
     )  # fmt: skip
 
 
@@ -61,7 +61,7 @@ def test_rows_are_written_and_compared(tmp_path) -> None:
 
 def test_the_mass_stays_behind_its_bound() -> None:
     rollout = receding(20, bounded=True).or_raise()
-    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
+    assert set(rollout.sources) == {InputSource.OPTIMAL}
     assert rollout.violation < 1e-6
 
 
@@ -70,7 +70,7 @@ def test_three_solvers_agree_over_a_third_of_a_second() -> None:
     runs = {kind: run(kind, 0.35) for kind in ("direct", "shooting", "schuetz")}
     for rollout in runs.values():
         assert rollout.cost == pytest.approx(runs["direct"].cost, rel=1e-2)
-        assert all(outcome.is_planned for outcome in rollout.outcomes)
+        assert all(source.is_planned for source in rollout.sources)
     assert max(d.residual for d in runs["shooting"].decisions) < 1e-4
     ends = {decision.status for decision in runs["schuetz"].decisions}
     assert ends <= {Status.SMALL_DECREASE, Status.COST_ROSE, Status.SOLVED, Status.STATIONARY}

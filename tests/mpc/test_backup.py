@@ -100,7 +100,7 @@ def test_a_controller_whose_solver_always_fails_still_passes_the_obstacle():
         return mpc.run(Plant(ocp=ocp), ocp.start(), ocp.duration)
 
     rollout = closed(instantaneous(ocp))
-    assert set(rollout.outcomes) == {InputSource.BACKUP}
+    assert set(rollout.sources) == {InputSource.BACKUP}
     still = closed(lambda x, t: np.zeros(3))
     assert rollout.cost < still.cost
 

@@ -61,9 +61,9 @@ def test_a_reference_that_ends_leaves_the_last_plan_and_then_the_backup_law(tmp_
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(mass(), np.zeros(2), 1.5, watch=recorder.watch)
     # The last whole preview starts at 0.5 s; its plan lasts for 9 more steps.
-    assert set(rollout.outcomes[:11]) == {InputSource.OPTIMAL}
-    assert set(rollout.outcomes[11:20]) == {InputSource.SHIFTED}
-    assert set(rollout.outcomes[20:]) == {InputSource.BACKUP}
+    assert set(rollout.sources[:11]) == {InputSource.OPTIMAL}
+    assert set(rollout.sources[11:20]) == {InputSource.SHIFTED}
+    assert set(rollout.sources[20:]) == {InputSource.BACKUP}
     assert "no parameters from t = 0.55 s on" in rollout.messages[11]
     assert "'reference' has 10 samples" in rollout.messages[11]
     assert not rollout.decisions[11].parameters_known
@@ -94,13 +94,13 @@ def test_an_earlier_plan_is_judged_by_the_parameters_it_was_made_with() -> None:
 
     mpc = MPC(ocp=walled, solver=MultipleShooting(10), dt=0.1, parameters=by_radio)
     first = mpc.step(START, 0.0)
-    assert first.outcome is InputSource.OPTIMAL
+    assert first.source is InputSource.OPTIMAL
     told["on"] = False
     second = mpc.step(plan_of(first).x[1], 0.1)
-    assert second.outcome is InputSource.SHIFTED
+    assert second.source is InputSource.SHIFTED
     assert "the radio is off" in second.message
     told["on"] = True
-    assert mpc.step(plan_of(first).x[2], 0.2).outcome is InputSource.OPTIMAL
+    assert mpc.step(plan_of(first).x[2], 0.2).source is InputSource.OPTIMAL
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_without_plan_and_measurement_the_backup_law_is_told_so() -> None:
     seen: list[np.ndarray] = []
     mpc = replace(tracking(1.0), backup=lambda x, t: (seen.append(x), [0.5])[1])
     decision = mpc.step([np.nan, 0.0], 0.0)
-    assert decision.outcome is InputSource.BACKUP
+    assert decision.source is InputSource.BACKUP
     assert np.isnan(seen[0][0]), "no state is made up"
 
 

@@ -31,7 +31,7 @@ def stands(rollout: Rollout) -> None:
 @pytest.mark.parametrize("horizon", HORIZONS[1:])
 def test_it_swings_up_and_stays(horizon: float) -> None:
     rollout = loop(Setting("nominal", "fatrop", horizon)).or_raise()
-    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
+    assert set(rollout.sources) == {InputSource.OPTIMAL}
     assert np.abs(rollout.inputs).max() == pytest.approx(FORCE, abs=1e-6)
     stands(rollout)
     np.testing.assert_allclose(rollout.x[-1], [0.0, np.pi, 0.0, 0.0], atol=5e-3)

@@ -128,7 +128,7 @@ def test_the_law_in_force_is_seen():
     assert f"backup_law=Backup({REGULATOR})" in repr(mpc)
     x = np.array([0.5, 0.0])
     decision = mpc.step(x, 0.0)
-    assert decision.outcome is InputSource.BACKUP
+    assert decision.source is InputSource.BACKUP
     assert decision.message.endswith(f"backup: {REGULATOR}")
     np.testing.assert_allclose(decision.input, saturated_lqr(cart(), dt=DT)(x, 0.0))
     own = always_failing(cart(), backup=lambda x, t: [0.5])
@@ -138,7 +138,7 @@ def test_the_law_in_force_is_seen():
 
 def test_none_refuses_even_where_an_input_could_be_held():
     mpc = replace(always_failing(cart(), backup=None))
-    mpc.memory = mpc.memory.after(np.array([1.0]), None, 0, tried=True)
+    mpc.state = mpc.state.after(np.array([1.0]), None, solver_ran=True)
     with pytest.raises(ControlRefused, match="there is no backup law"):
         mpc.step([0.5, 0.0], 0.0)
     holding = replace(mpc, backup="hold")
@@ -166,7 +166,7 @@ def test_without_a_state_the_suggested_law_holds():
 
 def test_the_suggested_regulator_brings_the_cart_home():
     rollout = always_failing(cart()).run(Plant(ocp=cart()), [0.5, 0.0], 6.0)
-    assert set(rollout.outcomes) == {InputSource.BACKUP}
+    assert set(rollout.sources) == {InputSource.BACKUP}
     assert np.abs(rollout.x[-1]).max() < 1e-2
     assert np.abs(rollout.inputs).max() <= LIMIT
 
@@ -200,7 +200,7 @@ def test_steps_of_a_suggested_law_replay_to_the_last_bit(tmp_path: Path):
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:
         rollout = mpc.run(plant, [1.0, 0.0], 3.0, watch=recorder.watch).or_raise()
     assert rollout.counts[InputSource.BACKUP] > 10
-    steps = range(len(rollout.outcomes))
+    steps = range(len(rollout.sources))
     assert all(step.is_exact for step in replay_all(mpc, tmp_path / "flight", steps))
 
 
@@ -216,4 +216,4 @@ def test_no_fault_gets_through_with_the_suggested_laws(subject, steps, monkeypat
     monkeypatch.setitem(SUBJECTS, subject, suggested)
     report = reduce(add, campaign(subject, steps, seed=1))
     assert report.is_clean, report
-    assert any(outcome is InputSource.BACKUP for _, outcome in report.outcomes), "it was needed"
+    assert any(source is InputSource.BACKUP for _, source in report.sources), "it was needed"

@@ -29,7 +29,6 @@ from ocp import (
     Status,
     replay_all,
 )
-from ocp.mpc.solver_options import with_mpc_defaults
 from solvers import IndirectShooting, MultipleShooting
 from tests.mpc.problems import FASTEST, LIMIT, Change, cart, is_an_input, scripted
 
@@ -61,7 +60,7 @@ def loop(mpc: MPC, duration: float = 1.0):
 
 def test_without_faults_every_decision_is_optimal_and_the_cart_arrives() -> None:
     rollout = loop(controller(), 4.0).or_raise()
-    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
+    assert set(rollout.sources) == {InputSource.OPTIMAL}
     assert not any(rollout.messages)
     assert np.abs(rollout.x[-1]).max() < 1e-2
     assert rollout.violation < 1e-6
@@ -81,7 +80,7 @@ def test_a_failure_takes_the_shifted_plan_and_names_itself(change: Change, word:
     rollout = loop(controller({0.3: change, 0.4: change}))
     expected = [InputSource.OPTIMAL] * 10
     expected[3] = expected[4] = InputSource.SHIFTED
-    assert list(rollout.outcomes) == expected, "it recovers when the fault ends"
+    assert list(rollout.sources) == expected, "it recovers when the fault ends"
     assert word in rollout.messages[3]
     assert [d.age for d in rollout.decisions[2:6]] == [0, 1, 2, 0]
     undisturbed = loop(controller())
@@ -95,6 +94,11 @@ class Watched(Solver):
 
     inner: Solver
     seen: list[InitialGuess | None] = field(default_factory=list)
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Watched":
+        """Set what is left open; see ``Solver``."""
+        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
+        return replace(self, inner=inner)
 
     def build(self, ocp: OCP) -> "WatchedProgram":
         return WatchedProgram(self.seen, self.inner.build(ocp))
@@ -117,7 +121,7 @@ def test_a_plan_that_leads_astray_is_no_start_for_ever() -> None:
     mpc = MPC(ocp=cart(), solver=watched, dt=DT)
     rollout = loop(mpc, 1.2)
     assert [k for k, guess in enumerate(watched.seen) if guess is None] == [0, 4, 6]
-    assert rollout.outcomes[7] is InputSource.OPTIMAL
+    assert rollout.sources[7] is InputSource.OPTIMAL
 
 
 def test_a_start_afresh_is_replayed(tmp_path: Path) -> None:
@@ -152,14 +156,16 @@ def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
     for limit in (0.5, np.inf):
         assert used(replace(plain, time_limit=limit)).time_limit == limit
     assert used(scripted({})).inner == replace(plain, time_limit=10.0)
-    assert with_mpc_defaults(plain, compiled=True) == replace(plain, time_limit=10.0, compiled=True)
+    assert plain.for_control_loop(compiled=True, time_limit=10.0) == replace(
+        plain, time_limit=10.0, compiled=True
+    )
     shooting = IndirectShooting()
-    assert with_mpc_defaults(shooting, compiled=False) is shooting
+    assert shooting.for_control_loop(compiled=False, time_limit=10.0) is shooting
 
 
 def test_a_small_excess_is_clipped_and_recorded() -> None:
     rollout = loop(controller({0.3: leaves_bounds(1e-7)}))
-    assert rollout.outcomes[3] is InputSource.OPTIMAL
+    assert rollout.sources[3] is InputSource.OPTIMAL
     assert rollout.inputs[3] == LIMIT
     assert rollout.clipped[3] == pytest.approx(1e-7)
 
@@ -187,7 +193,7 @@ def test_who_changes_an_input_changes_no_plan() -> None:
 
 def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
     good = loop(controller({0.3: becomes(Status.ITERATION_LIMIT)}))
-    assert good.outcomes[3] is InputSource.FEASIBLE
+    assert good.sources[3] is InputSource.FEASIBLE
     assert "ITERATION_LIMIT" in good.messages[3]
 
     def too_fast(solution: Solution) -> Solution:
@@ -196,7 +202,7 @@ def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
         return solution.with_(u=u, status=Status.ITERATION_LIMIT, message="")
 
     bad = loop(controller({0.3: too_fast}))
-    assert bad.outcomes[3] is InputSource.SHIFTED
+    assert bad.sources[3] is InputSource.SHIFTED
     assert "'speed' is violated" in bad.messages[3]
 
 
@@ -215,7 +221,7 @@ def test_noise_at_an_active_state_constraint_passes(as_bound: bool, backend) -> 
     outside = np.abs(rollout.measured[:, 1]) > FASTEST + 1e-6
     assert outside.sum() >= 5
     for k, decision in enumerate(rollout.decisions):
-        assert decision.outcome is (InputSource.FEASIBLE if outside[k] else InputSource.OPTIMAL)
+        assert decision.source is (InputSource.FEASIBLE if outside[k] else InputSource.OPTIMAL)
         assert ("by the given start itself" in decision.message) == outside[k]
         assert decision.age == 0, "every step has a plan of its own"
     assert rollout.violation < 0.1
@@ -229,7 +235,7 @@ def test_an_infeasible_plan_that_misses_its_end_is_not_followed() -> None:
               backup=lambda x, t: [0.0])  # fmt: skip
     decision = mpc.step([1.0, 0.0], 0.0)
     assert decision.status is Status.INFEASIBLE
-    assert decision.outcome is InputSource.BACKUP
+    assert decision.source is InputSource.BACKUP
     assert "'there' is violated" in decision.message
 
 
@@ -237,9 +243,9 @@ def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:
     script = {round(k * DT, 2): becomes(Status.FAILED) for k in range(2, 30)}
     mpc = controller(script, backup=lambda x, t: [-x[0] - 2.0 * x[1]])
     rollout = loop(mpc, 3.0)
-    assert rollout.outcomes[:2] == (InputSource.OPTIMAL,) * 2
-    assert set(rollout.outcomes[2:11]) == {InputSource.SHIFTED}
-    assert set(rollout.outcomes[11:]) == {InputSource.BACKUP}
+    assert rollout.sources[:2] == (InputSource.OPTIMAL,) * 2
+    assert set(rollout.sources[2:11]) == {InputSource.SHIFTED}
+    assert set(rollout.sources[11:]) == {InputSource.BACKUP}
     assert "nothing is left of it" in rollout.messages[-1]
     assert np.abs(rollout.x[-1]).max() < 0.2
 
@@ -247,7 +253,7 @@ def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:
 def test_where_that_is_the_choice_the_last_input_is_held() -> None:
     script = {round(k * DT, 2): becomes(Status.FAILED) for k in range(2, 30)}
     rollout = loop(controller(script, backup="hold"), 1.5)
-    assert set(rollout.outcomes[11:]) == {InputSource.BACKUP}
+    assert set(rollout.sources[11:]) == {InputSource.BACKUP}
     assert rollout.messages[-1].endswith("backup: hold")
     assert (rollout.inputs[11:] == rollout.inputs[10]).all()
 
@@ -273,19 +279,19 @@ def test_a_missing_measurement_is_no_state() -> None:
     mpc = controller()
     mpc.step([1.0, 0.0], 0.0)
     decision = mpc.step([np.nan, 0.0], DT)
-    assert decision.outcome is InputSource.SHIFTED
+    assert decision.source is InputSource.SHIFTED
     assert "the measurement is not finite" in decision.message
-    assert mpc.step([0.9, -0.2], 2 * DT).outcome is InputSource.OPTIMAL
+    assert mpc.step([0.9, -0.2], 2 * DT).source is InputSource.OPTIMAL
 
 
 def test_late_answers_are_kept_for_later() -> None:
     mpc = controller(backup="hold")
     first = mpc.step([1.0, 0.0], 0.0)
     late = mpc.step([0.99, -0.2], DT, late=True)
-    assert late.outcome is InputSource.SHIFTED
+    assert late.source is InputSource.SHIFTED
     assert late.late
     assert late.plan is first.plan
-    assert mpc.memory.plan is not first.plan
+    assert mpc.state.plan is not first.plan
     slow = replace(mpc, budget=1e-9)
     with pytest.raises(ControlRefused, match="too late for its step"):
         slow.step([1.0, 0.0], 0.0)
@@ -295,12 +301,12 @@ def test_a_late_plan_outlives_the_refusal_of_its_step() -> None:
     mpc = controller(backup="hold")
     with pytest.raises(ControlRefused, match="too late") as refused:
         mpc.step([1.0, 0.0], 0.0, late=True)
-    attempt = refused.value.attempt
-    assert attempt is not None
-    assert attempt.late
-    assert attempt.status is Status.SOLVED
+    report = refused.value.report
+    assert report is not None
+    assert report.late
+    assert report.status is Status.SOLVED
     decision = mpc.step([np.nan, 0.0], DT)
-    assert decision.outcome is InputSource.SHIFTED, "the late plan is the last one"
+    assert decision.source is InputSource.SHIFTED, "the late plan is the last one"
     assert decision.age == 1
 
 
@@ -335,11 +341,11 @@ def test_whatever_fails_no_input_is_out_of_bounds(script, sensors) -> None:
         try:
             decision = mpc.step(told, k * DT)
         except ControlRefused:
-            assert mpc.memory.plan is None, "it refuses where it knows neither plan nor state"
+            assert mpc.state.plan is None, "it refuses where it knows neither plan nor state"
             assert not np.isfinite(told).all()
             continue
         assert is_an_input(decision.input)
-        assert (decision.outcome is InputSource.OPTIMAL) or decision.message
+        assert (decision.source is InputSource.OPTIMAL) or decision.message
         x = x + DT * np.array([x[1], decision.input[0]])
 
 

@@ -67,7 +67,7 @@ def driver(**options) -> MPC:
 def test_continuous_solvers_run_in_the_loop(solver) -> None:
     ocp = unconstrained()
     rollout = MPC(ocp=ocp, solver=solver, dt=0.05).run(Plant(ocp=ocp), START, 1.0).or_raise()
-    planned = [outcome.is_planned for outcome in rollout.outcomes]
+    planned = [source.is_planned for source in rollout.sources]
     assert all(planned)
     if not isinstance(solver, Greedy):
         best = MPC(ocp=ocp, solver=MultipleShooting(20), dt=0.05)
@@ -82,7 +82,7 @@ def test_continuous_solvers_run_in_the_loop(solver) -> None:
 def test_linear_solvers_run_in_the_loop(solver) -> None:
     ocp = discretise(unconstrained(), dt=0.05)
     rollout = MPC(ocp=ocp, solver=solver, dt=0.05).run(Plant(ocp=ocp), START, 1.0).or_raise()
-    assert set(rollout.outcomes) == {InputSource.OPTIMAL}
+    assert set(rollout.sources) == {InputSource.OPTIMAL}
     other = MPC(ocp=ocp, solver=LinearMPC(), dt=0.05).run(Plant(ocp=ocp), START, 1.0)
     np.testing.assert_allclose(rollout.inputs, other.inputs, atol=1e-6)
 
@@ -95,7 +95,7 @@ def test_a_plain_law_in_the_same_loop() -> None:
     ocp = cart()
     law = FeedbackLaw(law=lambda x, t: [-5.0 * x[0] - 3.0 * x[1]], bounds=ocp.control_bounds)
     rollout = closed_loop(law, Plant(ocp=ocp), START, 5.0, dt=DT).or_raise()
-    assert set(rollout.outcomes) == {InputSource.FEASIBLE}
+    assert set(rollout.sources) == {InputSource.FEASIBLE}
     assert np.abs(rollout.x[-1]).max() < 0.05
     assert rollout.clipped[0] == pytest.approx(3.0)
     wrong = closed_loop(FeedbackLaw(law=lambda x, t: [np.nan]), Plant(ocp=ocp), START, 1.0, dt=DT)
@@ -231,7 +231,7 @@ def test_a_rollout_is_saved_and_read(tmp_path: Path) -> None:
     rollout = driver().run(Plant(ocp=cart()), START, 0.5)
     back = Rollout.load(rollout.save(tmp_path / "loop"), cart())
     np.testing.assert_array_equal(back.x, rollout.x)
-    assert back.outcomes == rollout.outcomes
+    assert back.sources == rollout.sources
     assert back.messages == rollout.messages
     assert back.cost == rollout.cost
     with pytest.raises(ProblemError, match="is a loop with 'cart'"):
@@ -292,8 +292,8 @@ def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: floa
     with FlightRecorder(mpc, file) as recorder:
         rollout = mpc.run(plant, START, 0.8, watch=recorder.watch)
     found = list(records(file))
-    assert [record.outcome for record in found] == list(rollout.outcomes)
-    assert rollout.outcomes.count(InputSource.SHIFTED) == 2
+    assert [record.source for record in found] == list(rollout.sources)
+    assert rollout.sources.count(InputSource.SHIFTED) == 2
     assert all(replay(mpc, file, k).is_exact for k in range(len(found)))
     with pytest.raises(ProblemError, match="has no step 8"):
         replay(mpc, file, 8)
@@ -312,10 +312,10 @@ def test_a_refusal_is_recorded_and_refused_again(tmp_path: Path) -> None:
         for k, (x, late) in enumerate([([1.0, 0.0], True), ([np.nan, 0.0], False), (START, True)]):
             mpc_step(mpc, recorder, np.array(x), k * DT, late)
     first, second, third = records(file)
-    assert (first.outcome, first.input, first.status) == (None, None, Status.SOLVED)
+    assert (first.source, first.input, first.status) == (None, None, Status.SOLVED)
     assert "too late for its step; there is no earlier plan" in first.message
     assert first.plan is not None
-    assert (second.outcome, third.outcome) == (InputSource.SHIFTED, InputSource.SHIFTED)
+    assert (second.source, third.source) == (InputSource.SHIFTED, InputSource.SHIFTED)
     assert [step.is_exact for step in replay_all(mpc, file, range(3))] == [True] * 3
 
 
@@ -334,7 +334,7 @@ def test_a_loop_records_the_refusal_that_ends_it(tmp_path: Path) -> None:
         rollout = mpc.run(jumps, START, 1.0, watch=recorder.watch)
     assert "FAILED" in rollout.ended
     found = list(records(tmp_path / "flight"))
-    assert [r.outcome for r in found] == [InputSource.OPTIMAL] * 3 + [None]
+    assert [r.source for r in found] == [InputSource.OPTIMAL] * 3 + [None]
     assert found[3].message in rollout.ended
     assert all(step.is_exact for step in replay_all(mpc, tmp_path / "flight", range(4)))
     # Whoever has a backup law now does not refuse: that is no exact replay.

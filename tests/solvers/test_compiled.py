@@ -138,4 +138,4 @@ def test_mpc_without_a_compiler_decides_all_the_same(monkeypatch):
     with pytest.warns(InterpretedWarning, match="not-a-compiler-at-all") as caught:
         decision = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1).step([1.0, 0.0], 0.0)
     assert len([w for w in caught if w.category is InterpretedWarning]) == 1
-    assert decision.outcome.name == "OPTIMAL"
+    assert decision.source.name == "OPTIMAL"

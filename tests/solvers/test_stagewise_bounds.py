@@ -379,6 +379,6 @@ def test_the_closed_loop_of_the_cart_pole_is_that_of_the_direct_method() -> None
     kinds = ("fatrop", "newton")
     loops = (cart_pole_loop.Setting("nominal", kind, 0.75) for kind in kinds)
     direct, newton = (cart_pole_loop.loop(each).or_raise() for each in loops)
-    assert all(outcome.is_planned for outcome in newton.outcomes)
+    assert all(source.is_planned for source in newton.sources)
     assert newton.cost == pytest.approx(direct.cost, rel=1e-6)
     assert cart_pole_loop.up_since(newton) == cart_pole_loop.up_since(direct)

@@ -301,5 +301,5 @@ def test_bad_options(make) -> None:
 def test_the_closed_loop_of_the_arm_is_that_of_the_direct_method() -> None:
     loops = {kind: loop(arm_scenario("arm-001"), kind, 0.35) for kind in ("direct", "newton")}
     for rollout in loops.values():
-        assert all(outcome.is_planned for outcome in rollout.or_raise().outcomes)
+        assert all(source.is_planned for source in rollout.or_raise().sources)
     assert loops["newton"].cost == pytest.approx(loops["direct"].cost, rel=1e-6)

@@ -1,6 +1,6 @@
 """``StagewiseNewton``: Newton's method by a Riccati recursion, within bounds of the controls."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -69,6 +69,10 @@ class StagewiseNewton(Solver):
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")
         for name in ("tolerance", "accuracy"):
             check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
+        """Set what is left open; see ``Solver``."""
+        return replace(self, compiled=True) if compiled else self
 
     def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""

@@ -1,6 +1,6 @@
 """An earlier plan, seen from a later instant: what is left of it, and as a first guess."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,8 +8,7 @@ from ocp.checks.errors import ProblemError
 from ocp.solution.solution import Solution
 
 
-@dataclass(frozen=True, eq=False)
-class ShiftedPlan:
+class ShiftedPlan(NamedTuple):
     """A plan moved to start later, as a first guess for the same horizon.
 
     States, controls and costates are read off at the later instants, those that a solver asks

@@ -1,23 +1,22 @@
-"""What people look at after a closed loop."""
+"""The figure of a closed loop: states, inputs and running cost over time."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ocp.checks.errors import ProblemError
-from ocp.closed_loop.decision import InputSource
-from ocp.closed_loop.rollout import Rollout
+from ocp.loop_plotting.loop_record import LoopRecord
 
-# Of the rungs.
+# Of the sources of an input.
 COLOURS = {
-    InputSource.OPTIMAL: "#2f7fb8",
-    InputSource.FEASIBLE: "#3aa98f",
-    InputSource.SHIFTED: "#e8710a",
-    InputSource.BACKUP: "tab:red",
+    "OPTIMAL": "#2f7fb8",
+    "FEASIBLE": "#3aa98f",
+    "SHIFTED": "#e8710a",
+    "BACKUP": "tab:red",
 }
 
 
-def plot_rollout(rollout: Rollout) -> Figure:
+def plot_rollout(rollout: LoopRecord) -> Figure:
     """Return states, inputs and running cost over time; the shade says where an input is from.
 
     Raises:
@@ -49,7 +48,7 @@ def plot_rollout(rollout: Rollout) -> Figure:
     return figure
 
 
-def refuse_empty(rollout: Rollout, what: str) -> None:
+def refuse_empty(rollout: LoopRecord, what: str) -> None:
     """Raise ``ProblemError`` if the loop ended before its first step."""
     if not len(rollout.inputs):
         raise ProblemError(f"{what}: the loop has no step; it ended: {rollout.ended}")
@@ -60,10 +59,10 @@ def labels(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{n} [{u}]" for n, u in zip(names, units, strict=True)) if units else names
 
 
-def _shade(axes: Axes, rollout: Rollout) -> None:
+def _shade(axes: Axes, rollout: LoopRecord) -> None:
     """Colour the background where the input is not that of an optimal plan."""
     for k in range(len(rollout.inputs)):
-        outcome = rollout.acting(k)
-        if outcome not in (None, InputSource.OPTIMAL):
+        source = rollout.acting(k)
+        if source and source.name != "OPTIMAL":
             left, right = rollout.t[k], rollout.t[k + 1]
-            axes.axvspan(left, right, color=COLOURS[outcome], alpha=0.25, lw=0)
+            axes.axvspan(left, right, color=COLOURS[source.name], alpha=0.25, lw=0)

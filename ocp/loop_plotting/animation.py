@@ -1,4 +1,4 @@
-"""A closed loop as a moving picture: what happened so far, and what is planned next."""
+"""The animation of a closed loop: what happened so far, and what is planned next."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,10 +12,9 @@ from matplotlib.lines import Line2D
 
 from ocp.checks.arguments import check_callable, check_instance, check_positive, check_whole
 from ocp.checks.errors import ProblemError
-from ocp.closed_loop.decision import Decision
-from ocp.closed_loop.rollout import Draw, Progress, Rollout
-from ocp.closed_loop.shifted_plan import plan_controls
-from ocp.plotting.rollout import COLOURS, labels, refuse_empty
+from ocp.loop_plotting.loop_record import Draw, LoopRecord, PlannedInput, Progress
+from ocp.loop_plotting.rollout import COLOURS, labels, refuse_empty
+from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 
 _DPI = 80
@@ -29,7 +28,7 @@ _INSTANTS = 5
 
 
 def animate_rollout(
-    rollout: Rollout,
+    rollout: LoopRecord,
     path: str | Path,
     *,
     draw: Draw | None = None,
@@ -61,7 +60,7 @@ def animate_rollout(
     return path
 
 
-def _times(rollout: Rollout, frames_per_second: int, speed: float) -> np.ndarray:
+def _times(rollout: LoopRecord, frames_per_second: int, speed: float) -> np.ndarray:
     """Return the instants that are shown [s]."""
     refuse_empty(rollout, "animation")
     if not 1 <= check_whole(frames_per_second, "animation: frames per second") <= _FASTEST:
@@ -142,14 +141,14 @@ class _AnimatedPanel:
 class _Film:
     """The figure and what moves in it."""
 
-    rollout: Rollout
+    rollout: LoopRecord
     figure: Figure
     panels: tuple[_AnimatedPanel, ...]
     scene: Axes | None
     draw: Draw | None
 
     @classmethod
-    def of(cls, rollout: Rollout, draw: Draw | None) -> "_Film":
+    def of(cls, rollout: LoopRecord, draw: Draw | None) -> "_Film":
         """Lay the figure out: the scene to the left where there is one."""
         figure = Figure(figsize=(11.0 if draw else 7.0, 5.0), dpi=_DPI, layout="constrained")
         grid = figure.add_gridspec(2, 2 if draw else 1)
@@ -173,21 +172,21 @@ class _Film:
     def show(self, t: float) -> None:
         """Draw an instant [s]."""
         rollout = self.rollout
-        k = min(int(np.searchsorted(rollout.t, t, side="right")), len(rollout.outcomes)) - 1
+        k = min(int(np.searchsorted(rollout.t, t, side="right")), len(rollout.inputs)) - 1
         decision = rollout.decisions[k] if rollout.decisions else None
         for panel in self.panels:
             panel.show(t, decision.plan if decision else None)
-        outcome = rollout.acting(k)
+        source = rollout.acting(k)
         said, colour = "decided before", "0.3"
-        if outcome:
-            said, colour = outcome.name.lower(), COLOURS[outcome]
+        if source:
+            said, colour = source.name.lower(), COLOURS[source.name]
         self.figure.suptitle(f"{rollout.plant.name}: t = {t:.2f} s, {said}", color=colour)
         if self.scene and self.draw:
             self.scene.clear()
             self.draw(self.scene, _between(rollout.t, rollout.x, t), t)
 
 
-def _plans(rollout: Rollout) -> list[Solution]:
+def _plans(rollout: LoopRecord) -> list[Solution]:
     return [d.plan for d in rollout.decisions if d.plan is not None]
 
 
@@ -212,14 +211,14 @@ def _controls_ahead(plan: Solution, t: float) -> tuple[np.ndarray, np.ndarray]:
     return times, np.array([plan_controls(plan, at) for at in times]).reshape(len(times), nu)
 
 
-def _sends_controls(rollout: Rollout) -> bool:
+def _sends_controls(rollout: LoopRecord) -> bool:
     """Whether what is sent are the controls of the plans, not the rates of their states."""
     followed = [(d, d.plan) for d in rollout.decisions if d.plan is not None]
     dt = float(np.diff(rollout.t).max())
     return all(_is_control(decision, plan, dt) for decision, plan in followed)
 
 
-def _is_control(decision: Decision, plan: Solution, dt: float) -> bool:
+def _is_control(decision: PlannedInput, plan: Solution, dt: float) -> bool:
     span = decision.applies_at + np.linspace(0.0, dt, _INSTANTS)
     near = np.array([plan_controls(plan, float(t)) for t in span])
     if near.shape[1] != len(decision.input):

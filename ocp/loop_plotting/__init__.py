@@ -1,0 +1,1 @@
+"""Figures and films of closed loops; they take what they draw by structure."""
