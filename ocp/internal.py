@@ -23,9 +23,17 @@ from ocp.nlp.transcription import Transcription
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
+from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
+from ocp.problem.sizes import Sizes, time_unit
 from ocp.problem.start_feasibility import start_violation
 from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.scaled_program import (
+    ScaledProgram,
+    ScalingSolver,
+    in_original_units,
+    in_own_units,
+)
 
 __all__ = [
     "BufferedFunction",
@@ -39,6 +47,10 @@ __all__ = [
     "PiecewisePolynomial",
     "RunData",
     "RunResult",
+    "ScaledOCP",
+    "ScaledProgram",
+    "ScalingSolver",
+    "Sizes",
     "Stage",
     "Transcription",
     "Violation",
@@ -55,10 +67,15 @@ __all__ = [
     "differentiable_step",
     "elevated",
     "hamiltonian",
+    "in_original_units",
+    "in_own_units",
     "interpolate",
     "most_violated",
+    "scaled",
+    "sizes_of",
     "stage_hessian",
     "start_violation",
     "stationary",
     "symbol_type",
+    "time_unit",
 ]

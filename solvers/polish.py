@@ -3,7 +3,7 @@
 from time import perf_counter
 
 from ocp import Solution, Status, UnsupportedProblem, Work
-from ocp.internal import check_instance, check_positive
+from ocp.internal import check_instance, check_positive, in_original_units, in_own_units, scaled
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.step_halving import change_when_halved, finer
@@ -52,8 +52,11 @@ def polish(
         raise UnsupportedProblem(
             f"{ocp.name}: the cost has kinks (smoothness 0), no polish applies"
         )
+    if (own := scaled(ocp)) is not None:
+        polished = polish(in_own_units(solution, own), accuracy=accuracy, solver=solver)
+        return in_original_units(polished, own)
     started = perf_counter()
-    program = solver.build(ocp)
+    program = solver.prepare(ocp)
     built = perf_counter()
     result = _newton(program, solution)
     if not result.status.is_success:

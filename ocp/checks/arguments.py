@@ -144,3 +144,18 @@ def check_numbers(
         raise ProblemError(f"{what}[{wrong[0]}] is {vector[wrong[0]]}, {needed} is needed")
     vector.flags.writeable = False
     return vector
+
+
+def check_nominal(values: ArrayLike | None, size: int, what: str) -> np.ndarray | None:
+    """Return nominal sizes as a read-only vector (size,), or None where none are given.
+
+    Raises:
+        ProblemError: on a wrong number of them, or one that is not positive and finite.
+    """
+    if values is None:
+        return None
+    vector = check_numbers(values, size, what)
+    wrong = np.flatnonzero(vector <= 0.0)
+    if wrong.size:
+        raise ProblemError(f"{what}[{wrong[0]}] is {vector[wrong[0]]}, a positive size is needed")
+    return vector

@@ -14,6 +14,7 @@ from ocp.nlp.program_rows import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
+from ocp.problem.sizes import time_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,12 @@ class Transcription:
 
     def duration(self, w: np.ndarray) -> float:
         """Return final time minus t0 [s] of a vector of unknowns."""
-        return float(w[-1]) if self.ocp.has_free_time else self.ocp.duration
+        return float(w[-1]) * self.time_unit if self.ocp.has_free_time else self.ocp.duration
+
+    @cached_property
+    def time_unit(self) -> float:
+        """What a free final time is measured in [s]."""
+        return time_unit(self.ocp)
 
     # -- the stage ----------------------------------------------------------------------
 
@@ -133,13 +139,15 @@ class Transcription:
         stages = ca.reshape(w[: -self.nz], self.nz + nu, n)
         z = ca.horzcat(stages[: self.nz, :], w[-self.nz :])
         x, u = z[:nx, :], stages[self.nz :, :]
-        duration = z[nx, :-1] if ocp.has_free_time else ca.DM(np.full((1, n), ocp.duration))
+        duration = ca.DM(np.full((1, n), ocp.duration))
+        if ocp.has_free_time:
+            duration = self.time_unit * z[nx, :-1]
         h = duration / n
         t = t0 + h * ca.DM(np.arange(n)).T
-        t_final = t0 + (z[nx, -1] if ocp.has_free_time else ocp.duration)
+        t_final = t0 + (self.time_unit * z[nx, -1] if ocp.has_free_time else ocp.duration)
         after, costs = self.step.map(n)(x[:, :-1], u, t, h, p_left, p_right)
         if ocp.has_free_time:
-            after = ca.vertcat(after, duration)
+            after = ca.vertcat(after, z[nx, :-1])
         inside = self._path.map(n)(x[:, :-1], u, t, p_left)
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         by_stage = ca.vertcat(z[:, 1:] - after, inside)
@@ -182,7 +190,8 @@ class Transcription:
             if not ocp.has_free_start:
                 z[0] = data.x0
             if ocp.has_free_time:
-                z = np.hstack([z, np.full((self.n + 1, 1), np.asarray(getattr(time, side))[0])])
+                bound = np.asarray(getattr(time, side))[0] / self.time_unit
+                z = np.hstack([z, np.full((self.n + 1, 1), bound)])
             u = np.tile(np.asarray(getattr(control, side)).reshape(nu), (self.n, 1))
             result[key] = self.join(z, u)
         result["lbg"] = np.array([r.lower for r in self.rows])

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_instance, check_numbers
+from ocp.checks.arguments import check_instance, check_nominal, check_numbers
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_column
 
@@ -81,6 +81,8 @@ class Constraint:
         upper: number or (m,).
         at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
             manifold, and ``x0`` a guess) or ``"terminal"``.
+        nominal: a typical size of the rows, a number or (m,), to measure a violation by; None: it
+            is estimated, see ``OCP.sizes``.
 
     Raises:
         ProblemError: naming the constraint and what is wrong with place, expression or bounds.
@@ -91,6 +93,7 @@ class Constraint:
     lower: ArrayLike = -np.inf
     upper: ArrayLike = np.inf
     at: Place = "path"
+    nominal: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
@@ -107,6 +110,8 @@ class Constraint:
         object.__setattr__(self, "expression", expression)
         object.__setattr__(self, "lower", box.lower)
         object.__setattr__(self, "upper", box.upper)
+        nominal = check_nominal(self.nominal, self.size, f"constraint '{self.name}': nominal")
+        object.__setattr__(self, "nominal", nominal)
 
     @property
     def size(self) -> int:

@@ -29,6 +29,7 @@ class ConstraintRow:
         kind: whether it limits controls alone.
         on_control: whether it depends on a control.
         label: what a message calls it; default: its name.
+        unit: what a violation of 1 is in the units of the user: of a scaled problem its size.
     """
 
     name: str
@@ -39,6 +40,7 @@ class ConstraintRow:
     kind: RowKind = "hard"
     on_control: bool = False
     label: str = ""
+    unit: float = 1.0
 
     @property
     def is_equation(self) -> bool:
@@ -75,7 +77,8 @@ class Violation(NamedTuple):
         """Return the whole sentence; empty where nothing is violated."""
         if self.row is None:
             return ""
-        return f"{self.row} is violated by {self.amount:.3g} at t = {self.t:.4g} s"
+        amount = self.amount * self.row.unit
+        return f"{self.row} is violated by {amount:.3g} at t = {self.t:.4g} s"
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
+from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_instance, check_positive
+from ocp.checks.arguments import check_instance, check_nominal, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import (
     check_column,
@@ -33,6 +34,9 @@ class Model:
         dt: step of a discrete-time model [s]; ``None``: ``f`` is dx/dt.
         x_units: a unit for each state, for plots and messages.
         u_units: a unit for each control.
+        x_nominal: a typical size of each state, a number or (nx,), for solvers to measure it by;
+            None: they estimate it, see ``OCP.sizes``.
+        u_nominal: the same of the controls (nu,).
 
     Raises:
         ProblemError: naming the symbol and the shape that are wrong.
@@ -46,6 +50,8 @@ class Model:
     dt: float | None = None
     x_units: tuple[str, ...] = ()
     u_units: tuple[str, ...] = ()
+    x_nominal: ArrayLike | None = None
+    u_nominal: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         """Check every shape and symbol."""
@@ -71,6 +77,9 @@ class Model:
                     f"model '{self.name}': {label}_units has {len(units)} entries "
                     f"for {size} symbols"
                 )
+        for label, size in (("x_nominal", self.nx), ("u_nominal", self.nu)):
+            what = f"model '{self.name}': {label}"
+            object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))
 
     @cached_property
     def nx(self) -> int:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from time import perf_counter
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,13 +27,12 @@ class InitialGuess(Protocol):
 
 
 class Program(ABC):
-    """A problem prepared by a solver: all symbolic work is done.
+    """A problem prepared by a solver: all symbolic work is done."""
 
-    Attributes:
-        is_stateful: whether an answer depends on the runs before it, other than by the guess.
-    """
-
-    is_stateful: ClassVar[bool] = False
+    @property
+    def is_stateful(self) -> bool:
+        """Whether an answer depends on the runs before it, other than by the guess."""
+        return False
 
     @abstractmethod
     def run(

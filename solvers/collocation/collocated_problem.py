@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ocp import OCP
-from ocp.internal import ConstraintRow, ConstraintRows, RunData, most_violated
+from ocp.internal import ConstraintRow, ConstraintRows, RunData, most_violated, time_unit
 from solvers.collocation.mesh import CollocationGrid
 
 
@@ -93,7 +93,14 @@ class CollocatedProblem:
 
     def duration(self, w: np.ndarray) -> float:
         """Return final time minus t0 [s] of a vector of unknowns."""
-        return float(self.split(w).z[-1, 0]) if self.ocp.has_free_time else self.ocp.duration
+        if not self.ocp.has_free_time:
+            return self.ocp.duration
+        return float(self.split(w).z[-1, 0]) * self.time_unit
+
+    @cached_property
+    def time_unit(self) -> float:
+        """What a free final time is measured in [s]."""
+        return time_unit(self.ocp)
 
     # -- the program --------------------------------------------------------------------
 
@@ -108,7 +115,7 @@ class CollocatedProblem:
         pieces = ca.vertsplit(w, [0, *np.cumsum([a * b for a, b in self._shapes]).tolist()])
         z, c, x = (ca.reshape(v, s) for v, s in zip(pieces, self._shapes, strict=True))
         fixed = ca.MX(ca.DM.ones(1, grid.mesh.intervals + 1) * ocp.duration)
-        lengths = z[nx, :] if ocp.has_free_time else fixed
+        lengths = self.time_unit * z[nx, :] if ocp.has_free_time else fixed
         lengths, last = lengths[:-1], lengths[-1]
         spread, a, b, basis = self._matrices
         u, h = c @ basis.T, (lengths * ca.DM(grid.mesh.widths).T) @ spread
@@ -193,7 +200,7 @@ class CollocatedProblem:
             )
             all_ = self._filled(inf, 0.0, 0.0)
             all_.z[:nx, 0] = state[:, 0] if ocp.has_free_start else data.x0
-            all_.z[nx:] = time[0, 0]
+            all_.z[nx:] = time[0, 0] / self.time_unit
             all_.c[:] = control
             all_.x[:] = state
             result[key] = all_.joined()

@@ -5,11 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, Solver, UnsupportedProblem
+from ocp import OCP, InitialGuess, UnsupportedProblem
 from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     check_instance,
     check_positive,
     check_whole,
@@ -25,7 +26,7 @@ from solvers.direct.nlp_run import NlpOutcome, NlpRun
 
 
 @dataclass(frozen=True)
-class Collocation(Solver):
+class Collocation(ScalingSolver):
     r"""States and controls are polynomials on each interval; the dynamics hold at its points.
 
     With d points an interval states have degree d and controls d - 1, continuous states and
@@ -98,7 +99,7 @@ class Collocation(Solver):
         limit = time_limit if self.time_limit is None else self.time_limit
         return replace(self, time_limit=limit)
 
-    def build(self, ocp: OCP) -> "CollocationProgram":
+    def prepare(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.
 
         Raises:
@@ -157,7 +158,9 @@ class CollocationProgram(MethodProgram):
         if not np.isfinite(x).all():
             x = np.tile(data.x0, (len(grid.nodes), 1))
         z = x[grid.edge_nodes].T
-        z = np.vstack([z, np.full((1, z.shape[1]), duration)]) if ocp.has_free_time else z
+        if ocp.has_free_time:
+            length = duration / self.transcription.time_unit
+            z = np.vstack([z, np.full((1, z.shape[1]), length)])
         return CollocationUnknowns(z, c.T, x[grid.point_nodes].T)
 
     def _coefficients(self, u: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp import OCP, RK4, Solution
-from ocp.internal import BufferedFunction, PiecewisePolynomial, RunData, Stage
+from ocp.internal import BufferedFunction, PiecewisePolynomial, RunData, Sizes, Stage, sizes_of
 from solvers.collocation.mesh import CollocationGrid
 
 # Steps of RK4 from node to node, for the defects.
@@ -35,6 +35,10 @@ class Defects:
         fine = step.mapaccum(_STEPS).map(count)
         return cls(ocp, grid, BufferedFunction(fine), BufferedFunction(step.mapaccum(count)))
 
+    @property
+    def _sizes(self) -> Sizes:
+        return sizes_of(self.ocp)
+
     def rollout(self, u: np.ndarray, duration: float, data: RunData) -> np.ndarray:
         """Return the states at the nodes under controls of coefficients (K m, nu), (N + 1, nx)."""
         x, _ = self.chain(data.x0, *self._schedule(u, duration, data, self.grid.nodes))
@@ -52,29 +56,30 @@ class Defects:
             data: of the run.
 
         Returns:
-            the largest defect between two nodes, relative to 1 + the state's largest abs(x)
-            along the trajectory, (N,), and the running cost between them, (N,).
+            the largest defect between two nodes, relative to the size of a state + its largest
+            abs(x) along the trajectory, (N,), and the running cost between them, (N,).
         """
         nodes, inside = self.grid.nodes, np.arange(_STEPS) / _STEPS
         fine = (nodes[:-1, None] + inside * np.diff(nodes)[:, None]).ravel()
         schedule = self._schedule(u, duration, data, np.append(fine, 1.0))
         steps, costs = self.between(x[:-1].T, *schedule)
         after = steps[:, _STEPS - 1 :: _STEPS].T
-        moved = np.abs(after - x[1:]) / (1.0 + np.abs(x).max(axis=0))
+        moved = np.abs(after - x[1:]) / (self._sizes.x + np.abs(x).max(axis=0))
         return moved.max(axis=1), costs.reshape(-1, _STEPS).sum(axis=1)
 
     def errors(self, solution: Solution) -> np.ndarray:
         """Return the error of each interval of a solution on this grid, (K,).
 
         Its largest relative defect, or the difference of the running cost from the
-        quadrature of the interval, relative to 1 + abs(cost).
+        quadrature of the interval, relative to the size of the cost + abs(cost).
         """
         begins = self.grid.edge_nodes[:-1]
         given = (solution.x, solution.u, solution.duration, solution.data)
         moved, costs = self.relative(*given)
         of_cost = np.add.reduceat(costs, begins) - self._quadrature(*given)
         return np.maximum(
-            np.maximum.reduceat(moved, begins), np.abs(of_cost) / (1.0 + abs(solution.cost))
+            np.maximum.reduceat(moved, begins),
+            np.abs(of_cost) / (self._sizes.cost + abs(solution.cost)),
         )
 
     def _quadrature(

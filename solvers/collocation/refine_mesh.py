@@ -7,7 +7,14 @@ from time import perf_counter
 import numpy as np
 
 from ocp import Solution, Status, Work
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import (
+    check_instance,
+    check_positive,
+    check_whole,
+    in_original_units,
+    in_own_units,
+    scaled,
+)
 from solvers.collocation.collocation import Collocation
 from solvers.collocation.collocation_points import HIGHEST, LOWEST
 from solvers.collocation.mesh import Mesh
@@ -97,12 +104,17 @@ def refine_mesh(
     check_instance(start, Solution, "refine_mesh: start")
     solver = solver or Collocation(intervals=10)
     check_instance(solver, Collocation, "refine_mesh: solver")
+    if (own := scaled(start.problem)) is not None:
+        found = refine_mesh(
+            in_own_units(start, own), solver=solver, accuracy=accuracy, rounds=rounds
+        )
+        return replace(found, solution=in_original_units(found.solution, own))
     cells = _Cells.of(solver.chosen_mesh)
     solution, done, made, work, iterations = start, [], 0.0, Work(), 0
     solve_time = 0.0
     for _ in range(rounds):
         begun = perf_counter()
-        program = replace(solver, mesh=cells.mesh, accuracy=np.inf).build(start.problem)
+        program = replace(solver, mesh=cells.mesh, accuracy=np.inf).prepare(start.problem)
         made += perf_counter() - begun
         data = start.data
         solution = program.run(x0=data.x0, t0=data.t0, parameters=start.parameters, guess=solution)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
-from ocp.internal import RunData, check_instance, check_positive, check_whole
+from ocp.internal import RunData, ScalingSolver, check_instance, check_positive, check_whole
 from solvers.constrained.multiplier_iteration import MultiplierIteration, MultiplierResult
 from solvers.constrained.multiplier_round import RelaxedProgram
 from solvers.constrained.multiplier_rule import MultiplierRule
@@ -17,7 +17,7 @@ from solvers.constrained.relaxed_problem import RelaxedProblem
 
 
 @dataclass(frozen=True)
-class AugmentedLagrangian(Solver):
+class AugmentedLagrangian(ScalingSolver):
     r"""Put constraints into the cost, and update multipliers and penalty until they are met.
 
     The relaxed problem (see ``RelaxedProblem``) is built once by the inner solver. After each of
@@ -89,7 +89,7 @@ class AugmentedLagrangian(Solver):
         inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
         return replace(self, inner=inner)
 
-    def build(self, ocp: OCP) -> "AugmentedLagrangianProgram":
+    def prepare(self, ocp: OCP) -> "AugmentedLagrangianProgram":
         """Relax the problem and let the inner solver build that.
 
         Raises:

@@ -17,12 +17,11 @@ from ocp import (
     Program,
     Signal,
     Solution,
-    Solver,
     Status,
     UnsupportedProblem,
     evaluate,
 )
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import ScalingSolver, check_instance, check_positive, check_whole
 from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
@@ -30,7 +29,7 @@ _MARGIN = "margin between the nodes"
 
 
 @dataclass(frozen=True)
-class BetweenNodes(Solver):
+class BetweenNodes(ScalingSolver):
     r"""A direct solver whose path constraints hold between the nodes as well.
 
     A direct method imposes path inequalities and state bounds at its nodes. Here they are
@@ -66,7 +65,7 @@ class BetweenNodes(Solver):
         inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
         return replace(self, inner=inner)
 
-    def build(self, ocp: OCP) -> "BetweenNodesProgram":
+    def prepare(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.
 
         Raises:

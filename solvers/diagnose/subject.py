@@ -64,7 +64,7 @@ class DiagnosedProblem:
     @cached_property
     def program(self) -> MultipleShootingProgram:
         """The problem, built."""
-        return self.solver.build(self.ocp)
+        return self.solver.prepare(self.ocp)
 
     @cached_property
     def coarse(self) -> "DiagnosedProblem":
@@ -98,7 +98,8 @@ class DiagnosedProblem:
         """The nodes of the first iterate; the last control is held at the end."""
         z, u = self.guess
         fractions = self.program.transcription.fractions
-        duration = z[0, -1] if self.ocp.has_free_time else self.ocp.duration
+        unit = self.program.transcription.time_unit
+        duration = z[0, -1] * unit if self.ocp.has_free_time else self.ocp.duration
         return self._points(z[:, : self.ocp.model.nx], u, fractions, duration)
 
     @cached_property

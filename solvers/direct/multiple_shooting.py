@@ -6,11 +6,12 @@ from typing import Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver
+from ocp import OCP, RK4, InitialGuess, Integrator
 from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     Transcription,
     check_instance,
     check_positive,
@@ -22,7 +23,7 @@ from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
-class MultipleShooting(Solver):
+class MultipleShooting(ScalingSolver):
     """The direct baseline, for every kind of problem that can be described.
 
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
@@ -83,7 +84,7 @@ class MultipleShooting(Solver):
         limit = time_limit if self.time_limit is None else self.time_limit
         return replace(self, compiled=compiled or self.compiled, time_limit=limit)
 
-    def build(self, ocp: OCP) -> "MultipleShootingProgram":
+    def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
         transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
         grid = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
@@ -132,8 +133,9 @@ class MultipleShootingProgram(MethodProgram):
         tr, ocp = self.transcription, self.transcription.ocp
         duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x, u = self.grid.first_iterate(data, guess, duration)
-        z = np.hstack([x, np.full((tr.n + 1, 1), duration)]) if ocp.has_free_time else x
-        return z, u
+        if ocp.has_free_time:
+            x = np.hstack([x, np.full((tr.n + 1, 1), duration / tr.time_unit)])
+        return x, u
 
     # -- the result ---------------------------------------------------------------------------
 

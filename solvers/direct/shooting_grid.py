@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ocp import OCP, InitialGuess, Integrator
-from ocp.internal import BufferedFunction, RunData, Stage, compiled
+from ocp.internal import BufferedFunction, RunData, Stage, compiled, sizes_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,10 @@ class ShootingGrid:
         """Nodes as fractions of the horizon, (N + 1,)."""
         return np.linspace(0.0, 1.0, self.n + 1)
 
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        return sizes_of(self.ocp).x
+
     def schedule(self, data: RunData, duration: float) -> list[np.ndarray]:
         """Return t, h and the parameters at both ends of every interval, one column each."""
         nodes = self.fractions
@@ -65,7 +69,7 @@ class ShootingGrid:
         return x, u
 
     def error(self, x: np.ndarray, u: np.ndarray, schedule: list[np.ndarray]) -> tuple[float, int]:
-        """Return the integration error, relative to 1 + abs(x), and the node where it is largest.
+        """Return the integration error, relative to size + abs(x), and the node with the largest.
 
         By how much half the integration step changes the state at the end of an interval; 0 for
         a discrete-time problem.
@@ -73,6 +77,6 @@ class ShootingGrid:
         if self.ocp.model.is_discrete:
             return 0.0, 0
         after, _ = self.half_step(x[:-1].T, u.T, *schedule)
-        moved = np.abs(after.T - x[1:]) / (1.0 + np.abs(x[1:]))
+        moved = np.abs(after.T - x[1:]) / (self._sizes + np.abs(x[1:]))
         worst = int(moved.max(axis=1).argmax())
         return float(moved[worst].max()), worst + 1

@@ -12,7 +12,6 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Solver,
     Status,
     UnsupportedProblem,
     Work,
@@ -21,6 +20,7 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     check_instance,
     check_not_negative,
     check_whole,
@@ -31,7 +31,7 @@ from solvers.gradient.line_search import AcceptedStep, Armijo, FixedStep, StepRu
 
 
 @dataclass(frozen=True)
-class Schuetz(Solver):
+class Schuetz(ScalingSolver):
     """Minimise over the control trajectory by (conjugate) gradients of the Hamiltonian.
 
     The defaults are Algorithm 2 as the thesis has it: Euler steps, a fixed step, Fletcher-
@@ -96,7 +96,7 @@ class Schuetz(Solver):
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=True) if compiled else self
 
-    def build(self, ocp: OCP) -> "SchuetzProgram":
+    def prepare(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""
         check_instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)

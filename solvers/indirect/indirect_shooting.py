@@ -12,7 +12,6 @@ from ocp import (
     Integrator,
     ProblemError,
     Solution,
-    Solver,
     UnsupportedProblem,
     Work,
 )
@@ -20,6 +19,7 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     check_instance,
     check_positive,
     check_whole,
@@ -36,7 +36,7 @@ from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSche
 
 
 @dataclass(frozen=True)
-class IndirectShooting(Solver):
+class IndirectShooting(ScalingSolver):
     """Shooting on the costates; exact to the integrator's error, if Newton gets there.
 
     One segment is the thesis' method: Newton-Raphson on psi(t0) (3.49, 3.50). More segments
@@ -89,7 +89,7 @@ class IndirectShooting(Solver):
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=True) if compiled else self
 
-    def build(self, ocp: OCP) -> "IndirectShootingProgram":
+    def prepare(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""
         check_instance(ocp, OCP, "indirect shooting: the problem")
         for c in ocp.at("path"):

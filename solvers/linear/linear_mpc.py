@@ -1,11 +1,11 @@
 """Constrained linear optimal control: one quadratic program, solved again and again."""
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, ProblemError, Solver, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, ProblemError, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,
@@ -13,6 +13,7 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     check_positive,
     start_violation,
 )
@@ -27,7 +28,7 @@ _UNAVOIDABLE = 1e-7
 
 
 @dataclass(frozen=True)
-class LinearMPC(Solver):
+class LinearMPC(ScalingSolver):
     r"""A convex linear-quadratic problem with linear constraints, as a quadratic program.
 
     .. math:: \min_z \; \frac12 z'Hz + g'z \quad \text{s.t.} \quad l \le Gz \le u
@@ -67,7 +68,7 @@ class LinearMPC(Solver):
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")
 
-    def build(self, ocp: OCP) -> "LinearMPCProgram":
+    def prepare(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""
         lq = linear_quadratic(ocp)
         form = _FORMS[self.form](lq)
@@ -120,7 +121,11 @@ class LinearMPCProgram(MethodProgram):
     backend: QpBackend
     softening: Softening | None
     _workspace: _Workspace = field(default_factory=_Workspace)
-    is_stateful: ClassVar[bool] = True
+
+    @property
+    def is_stateful(self) -> bool:
+        """The backend starts from its last answer."""
+        return True
 
     def prepare(self, matrices: Matrices) -> None:
         """Take other matrices; nothing happens if they are the last ones."""

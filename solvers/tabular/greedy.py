@@ -6,11 +6,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, Work
+from ocp import OCP, RK4, InitialGuess, Integrator, Status, Work
 from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     Stage,
     check_instance,
     check_positive,
@@ -21,7 +22,7 @@ from solvers.tabular.refusal import refuse_free_ends
 
 
 @dataclass(frozen=True)
-class Greedy(Solver):
+class Greedy(ScalingSolver):
     r"""One step ahead, for any problem with a fixed start and duration.
 
     .. math::
@@ -65,7 +66,7 @@ class Greedy(Solver):
         check_whole(self.max_iterations, "Greedy: max_iterations")
         check_positive(self.tolerance, "Greedy: tolerance", below=1.0)
 
-    def build(self, ocp: OCP) -> "GreedyProgram":
+    def prepare(self, ocp: OCP) -> "GreedyProgram":
         """Build the problem of a step, and that of the last step."""
         check_instance(ocp, OCP, "Greedy: the problem")
         refuse_free_ends(ocp, "Greedy")

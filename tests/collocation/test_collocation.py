@@ -114,7 +114,7 @@ def test_controls_never_leave_their_bounds(points: Family) -> None:
 def test_data_change_without_rebuilding(points: Family) -> None:
     """A run with other data equals a fresh problem that declares them."""
     solver = Collocation(12, points=points)
-    program = solver.build(tracker())
+    program = solver.prepare(tracker())
     first, x0, t0 = program.run(), [-0.4, 0.6], 0.7
     again = program.run(parameters=OTHER, x0=x0, t0=t0)
     declared = tracker()
@@ -124,7 +124,7 @@ def test_data_change_without_rebuilding(points: Family) -> None:
         else Signal(e.name, e.symbol, OTHER[e.name], hold=e.hold)
         for e in declared.parameters
     )
-    fresh = solver.build(changed(declared, parameters=entries, x0=x0)).run(t0=t0)
+    fresh = solver.prepare(changed(declared, parameters=entries, x0=x0)).run(t0=t0)
     np.testing.assert_allclose(again.u, fresh.u, atol=CERTIFIED)
     assert (again.t[0], again.t[-1]) == (t0, t0 + 1.2)
     np.testing.assert_array_equal(again.x[0], x0)
@@ -188,7 +188,7 @@ def test_initial_inequality_and_a_wall_at_a_free_start() -> None:
 def test_what_holds_where(points: Family) -> None:
     """State bounds and path constraints at the points: with Radau ends of intervals, too."""
     ocp = bryson_denham()
-    program = Collocation(7, points=points).build(ocp)
+    program = Collocation(7, points=points).prepare(ocp)
     grid, solution = program.transcription.grid, program.run()
     assert set(grid.edge_nodes[1:]) <= set(grid.point_nodes) or points == "gauss"
     assert not set(grid.edge_nodes) & set(grid.point_nodes) or points == "radau"
@@ -234,7 +234,7 @@ def test_a_mesh_where_it_matters() -> None:
 @both
 def test_any_solution_starts_it_and_it_starts_any(points: Family) -> None:
     ocp = van_der_pol()
-    program = Collocation(10, points=points).build(ocp)
+    program = Collocation(10, points=points).prepare(ocp)
     cold = program.run()
     starts: tuple[Solution, ...] = (
         solve(ocp, Schuetz.sound(intervals=30)),
@@ -266,7 +266,7 @@ def test_a_maximum_is_left(points: Family) -> None:
 def test_a_start_that_blows_up_is_replaced() -> None:
     """The roll-out of u = 0 leaves every bound: the first iterate then stays at the start."""
     ocp = moving(lambda x, u: x**3 + u, x0=1.2, constraints=ends(1.0))
-    program = Collocation(20).build(ocp)
+    program = Collocation(20).prepare(ocp)
     first = program._first_iterate(RunData(ocp.start(), 0.0, ocp.parameter_values()), None)
     assert np.abs(first.x).max() == 1.2
     assert program.run().status is Status.SOLVED
@@ -308,7 +308,7 @@ def test_plans_of_a_loop_replay_to_the_last_bit(tmp_path: Path) -> None:
 
 def test_refuses_discrete_time_by_name() -> None:
     with pytest.raises(UnsupportedProblem, match=r"no discrete-time model \('double integrator'\)"):
-        Collocation().build(discrete_double_integrator(5, 0.1))
+        Collocation().prepare(discrete_double_integrator(5, 0.1))
 
 
 @pytest.mark.parametrize(
@@ -334,6 +334,6 @@ def test_the_program_has_no_more_entries_than_it_needs() -> None:
     """One interval's rows touch one interval's unknowns: the Jacobian grows linearly."""
     counts = []
     for intervals in (10, 20):
-        program = Collocation(intervals, 3).build(van_der_pol()).transcription.program
+        program = Collocation(intervals, 3).prepare(van_der_pol()).transcription.program
         counts.append(ca.jacobian_sparsity(program["g"], program["x"]).nnz())
     assert counts[1] <= 2 * counts[0]

@@ -64,7 +64,7 @@ def test_a_reference_without_velocity_turns_the_order_round():
 @pytest.mark.parametrize(("steps", "dt"), [(10, 0.01), (20, 0.01), (25, 0.01), (40, 0.02)])
 def test_a_finely_sampled_bound_does_not_make_the_active_rows_cycle(form, steps, dt):
     """While the mass arrives at its bound, exchanging all wrong rows at once never ends."""
-    program = LinearMPC(form=form).build(thesis_tracking(steps, dt=dt))
+    program = LinearMPC(form=form).prepare(thesis_tracking(steps, dt=dt))
     reference = sinusoid(dt * np.arange(round(1.6 / dt) + steps + 1))
     step, x, touched = plant_step(dt), np.zeros(2), 0
     for k in range(round(1.5 / dt)):
@@ -82,8 +82,8 @@ def test_a_finely_sampled_bound_does_not_make_the_active_rows_cycle(form, steps,
 def test_it_agrees_with_an_interior_point_method(form):
     ocp = thesis_tracking(20)
     for x0 in ([0.0, 0.0], [1.9, 1.0], [-1.0, 4.0]):
-        mine = LinearMPC(form=form).build(ocp).run(x0=x0)
-        other = MultipleShooting().build(ocp).run(x0=x0)
+        mine = LinearMPC(form=form).prepare(ocp).run(x0=x0)
+        other = MultipleShooting().prepare(ocp).run(x0=x0)
         assert mine.status is Status.SOLVED
         assert max(mine.history[k][0] for k in ("primal", "dual", "gap")) < 1e-10
         np.testing.assert_allclose(mine.u, other.u, atol=1e-6)
@@ -94,7 +94,7 @@ def test_it_agrees_with_an_interior_point_method(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_costate_is_the_slope_of_the_cost_where_constraints_are_active(form):
-    program, step = LinearMPC(form=form).build(thesis_tracking(20)), tolerances.COST_STEP
+    program, step = LinearMPC(form=form).prepare(thesis_tracking(20)), tolerances.COST_STEP
     x0 = np.array([1.5, 2.0])
     solution = program.run(x0=x0)
     assert np.isclose(solution.x[:, 0], BOUND).any()
@@ -127,9 +127,9 @@ def test_mixed_terminal_and_path_constraints_of_a_changing_plant(form):
             Constraint("end", x, [0.0, -0.01], [0.0, 0.01], at="terminal"),
         ),
     )  # fmt: skip
-    program = LinearMPC(form=form).build(ocp)
+    program = LinearMPC(form=form).prepare(ocp)
     for t0 in (0.0, 2.0):
-        mine, other = program.run(t0=t0), MultipleShooting().build(ocp).run(t0=t0)
+        mine, other = program.run(t0=t0), MultipleShooting().prepare(ocp).run(t0=t0)
         assert mine.status is other.status is Status.SOLVED
         np.testing.assert_allclose(mine.u, other.u, atol=1e-6)
         np.testing.assert_allclose(mine.costate, other.costate, atol=1e-5)
@@ -144,7 +144,7 @@ def test_mixed_terminal_and_path_constraints_of_a_changing_plant(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_infeasible_start_names_constraint_and_step(form):
-    program = LinearMPC(form=form).build(thesis_tracking(5))
+    program = LinearMPC(form=form).prepare(thesis_tracking(5))
     failed = program.run(x0=[1.9, 40.0])
     assert failed.status is Status.INFEASIBLE
     assert "'bound of position' at step 5" in failed.message
@@ -153,7 +153,7 @@ def test_infeasible_start_names_constraint_and_step(form):
 
 
 def test_measured_state_outside_its_bound_is_no_reason_to_fail():
-    solution = LinearMPC().build(thesis_tracking(10)).run(x0=[2.0 + 1e-9, 0.0])
+    solution = LinearMPC().prepare(thesis_tracking(10)).run(x0=[2.0 + 1e-9, 0.0])
     assert solution.status is Status.SOLVED
     assert np.abs(solution.x[1:, 0]).max() <= 2.0 + 1e-9
 
@@ -161,20 +161,20 @@ def test_measured_state_outside_its_bound_is_no_reason_to_fail():
 @pytest.mark.parametrize("form", FORMS)
 def test_a_start_outside_its_bounds_is_named_and_the_rest_is_optimal(form):
     ocp, x0 = thesis_tracking(10), [2.05, -1.0]
-    outside = LinearMPC(form=form).build(ocp).run(x0=x0)
-    direct = MultipleShooting(10).build(ocp).run(x0=x0)
+    outside = LinearMPC(form=form).prepare(ocp).run(x0=x0)
+    direct = MultipleShooting(10).prepare(ocp).run(x0=x0)
     assert outside.status is direct.status is Status.INFEASIBLE
     assert outside.message == direct.message
     assert "by the given start itself" in outside.message
     np.testing.assert_allclose(outside.u, direct.u, atol=1e-6)
-    soft = LinearMPC(form=form, soft=1e5).build(ocp).run(x0=x0)
+    soft = LinearMPC(form=form, soft=1e5).prepare(ocp).run(x0=x0)
     assert soft.status is Status.SOLVED, "what may give way is no fault"
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_soft_constraints_are_exact_and_give_way_only_if_they_must(form):
     ocp = thesis_tracking(10)
-    hard, soft = LinearMPC(form=form).build(ocp), LinearMPC(form=form, soft=1e5).build(ocp)
+    hard, soft = LinearMPC(form=form).prepare(ocp), LinearMPC(form=form, soft=1e5).build(ocp)
     for x0 in ([0.0, 0.0], [1.5, 2.0]):
         a, b = hard.run(x0=x0), soft.run(x0=x0)
         np.testing.assert_allclose(a.u, b.u, atol=1e-6)
@@ -230,7 +230,7 @@ def test_backends_agree_on_random_feasible_problems(backend):
 
 def test_unknown_and_missing_backends_are_told_apart():
     with pytest.raises(ProblemError, match="not one of"):
-        LinearMPC(backend="cplex3000").build(thesis_tracking(5))
+        LinearMPC(backend="cplex3000").prepare(thesis_tracking(5))
     missing = sorted(set(known_backends()) - set(qpsolvers.available_solvers))
     with pytest.raises(ProblemError, match=r"not installed: pip install"):
         qp_backend(missing[0], 1e-6)
@@ -241,7 +241,7 @@ def test_an_error_inside_a_backend_is_its_own(monkeypatch):
         raise KeyError("a bug inside")
 
     monkeypatch.setitem(qpsolvers.solvers.solve_function, "osqp", broken)
-    program = LinearMPC().build(thesis_tracking(5))
+    program = LinearMPC().prepare(thesis_tracking(5))
     object.__setattr__(program, "backend", NamedBackend("osqp", 1e-6))
     solution = program.run()
     assert solution.status is Status.FAILED
@@ -250,7 +250,7 @@ def test_an_error_inside_a_backend_is_its_own(monkeypatch):
 
 def test_residuals_are_those_of_the_program():
     ocp = thesis_tracking(10)
-    program = LinearMPC().build(ocp)
+    program = LinearMPC().prepare(ocp)
     solution = program.run(x0=[1.5, 2.0])
     qp = program.quadratic_program(solution.data)
     z = program.form.point(solution.x, solution.u, program.lq.on(solution.data))
@@ -294,7 +294,7 @@ def test_bad_weights_are_named(weights, message):
 
 
 def test_reference_that_is_too_short_is_refused():
-    program = LinearMPC().build(thesis_tracking(10))
+    program = LinearMPC().prepare(thesis_tracking(10))
     with pytest.raises(ProblemError, match="'reference' has 8 samples"):
         program.run(parameters={"reference": np.zeros((8, 2))})
 
@@ -308,7 +308,7 @@ def test_nothing_is_printed(capfd):
 
 def test_a_solution_starts_it():
     ocp = thesis_tracking(20)
-    other = MultipleShooting().build(ocp).run(x0=[1.5, 2.0])
+    other = MultipleShooting().prepare(ocp).run(x0=[1.5, 2.0])
     for form in FORMS:
-        mine = LinearMPC(form=form).build(ocp).run(x0=[1.5, 2.0], guess=other)
+        mine = LinearMPC(form=form).prepare(ocp).run(x0=[1.5, 2.0], guess=other)
         assert mine.status is Status.SOLVED

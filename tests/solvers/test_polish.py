@@ -100,7 +100,7 @@ def test_doubles_the_steps_where_a_control_meets_its_bound(limit: float) -> None
 @pytest.mark.parametrize("name", ["rayleigh", "van-der-pol"])
 def test_the_change_under_half_the_step_is_predicted(name: str) -> None:
     direct = held(case_called(name))
-    program = IndirectShooting(segments=15).build(direct.problem)
+    program = IndirectShooting(segments=15).prepare(direct.problem)
     half = finer(program)
     extremal, then = program.run(guess=direct), half.run(guess=direct)
     predicted = change_when_halved(extremal, program, half)

@@ -136,7 +136,7 @@ def test_discrete_gradient(integrator, make: Callable[[], OCP]) -> None:
     """Per second of an interval, against differences of the discretised cost."""
     ocp, n = make(), 12
     solver = Schuetz(intervals=n, integrator=integrator, gradient="discrete")
-    program = solver.build(ocp)
+    program = solver.prepare(ocp)
     h = ocp.duration / n
     u = 0.5 * np.random.default_rng(3).normal(size=(n, 1))
     data = RunData.of(ocp, t0=0.0)
@@ -209,8 +209,8 @@ def test_discrete_time() -> None:
 
 def test_data_change_without_rebuilding() -> None:
     program, direct = (
-        Schuetz.sound(intervals=60).build(tracker()),
-        MultipleShooting(60).build(tracker()),
+        Schuetz.sound(intervals=60).prepare(tracker()),
+        MultipleShooting(60).prepare(tracker()),
     )
     runs: tuple[dict[str, Any], ...] = ({}, {"parameters": OTHER, "x0": [-0.4, 0.6], "t0": 0.7})
     for run in runs:
@@ -252,13 +252,13 @@ def test_deterministic() -> None:
 def test_refusals_name_the_term(make: Callable[[], OCP], term: str) -> None:
     ocp = make()
     with pytest.raises(UnsupportedProblem, match=term) as error:
-        Schuetz.sound().build(ocp)
+        Schuetz.sound().prepare(ocp)
     assert str(error.value).startswith(ocp.name)
 
 
 def test_the_continuous_gradient_refuses_discrete_time() -> None:
     with pytest.raises(UnsupportedProblem, match="discrete in time"):
-        Schuetz().build(discrete_double_integrator(5, 0.1))
+        Schuetz().prepare(discrete_double_integrator(5, 0.1))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ STEPS = 300
 
 
 def judged(ocp: OCP, segments: int = 1) -> tuple[Solution, SecondOrder]:
-    program = IndirectShooting(segments=segments, steps=STEPS).build(ocp)
+    program = IndirectShooting(segments=segments, steps=STEPS).prepare(ocp)
     solution = program.run()
     assert solution.status is Status.STATIONARY
     return solution, program.second_order(solution)
@@ -63,7 +63,7 @@ def test_legendre_fails_where_the_hamiltonian_turns_concave() -> None:
         horizon=2.0,
         running_cost=(1.001 - t) * u**2 + x**2,
     )
-    program = IndirectShooting(segments=1, steps=STEPS).build(ocp)
+    program = IndirectShooting(segments=1, steps=STEPS).prepare(ocp)
     solution = program.run()
     assert solution.status is Status.FAILED
     assert solution.message == "the control is no minimum of the Hamiltonian at t = 1.007 s"

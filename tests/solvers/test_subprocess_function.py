@@ -232,7 +232,7 @@ def test_fatrop_is_ended_where_it_never_returns() -> None:
     solver = MultipleShooting(
         8, backend="fatrop", max_iterations=40, time_limit=0.5, feasibility_restoration=False
     )
-    nlp = solver.build(arm(()).mpc.ocp).nlp
+    nlp = solver.prepare(arm(()).mpc.ocp).nlp
     data = dict(np.load(DATA))
     w0, p = data.pop("w0"), data.pop("p")
     answer = nlp.solve(w0, p, data)
@@ -258,7 +258,7 @@ class Stuck(SubprocessFunction):
 
 def stuck(answers: int = 0, *, feasibility_restoration: bool = False) -> MultipleShootingProgram:
     solver = MultipleShooting(10, backend="fatrop", feasibility_restoration=feasibility_restoration)
-    program = solver.build(cart())
+    program = solver.prepare(cart())
     own = program.nlp
     return replace(program, nlp=replace(own, subprocess=Stuck(own.function, answers)))
 
@@ -279,7 +279,7 @@ def test_feasibility_is_restored_after_a_lost_answer_as_after_any_failure() -> N
 
 def test_an_answer_is_kept_where_only_its_test_is_lost() -> None:
     """From its own solution a solver does not move, and is run again from perturbed controls."""
-    good = MultipleShooting(10, backend="fatrop").build(cart()).run()
+    good = MultipleShooting(10, backend="fatrop").prepare(cart()).run()
     solution = stuck(answers=1).run(guess=good)
     assert solution.status is Status.STATIONARY
     assert "from perturbed controls, fatrop did not return" in solution.message
@@ -288,10 +288,12 @@ def test_an_answer_is_kept_where_only_its_test_is_lost() -> None:
 
 @pytest.mark.parametrize("solver", [MultipleShooting(20), Collocation(10)], ids=["ms", "colloc"])
 def test_ipopt_returns_its_iterate_at_the_time_limit(solver: MultipleShooting) -> None:
-    solution = replace(solver, time_limit=1e-9, **_without_restoration(solver)).build(cart()).run()
+    solution = (
+        replace(solver, time_limit=1e-9, **_without_restoration(solver)).prepare(cart()).run()
+    )
     assert solution.status is Status.TIME_LIMIT
     assert np.isfinite(solution.cost)
-    assert replace(solver, time_limit=60.0).build(cart()).run().status is Status.SOLVED
+    assert replace(solver, time_limit=60.0).prepare(cart()).run().status is Status.SOLVED
 
 
 def _without_restoration(solver: object) -> dict[str, bool]:
@@ -308,13 +310,13 @@ def test_a_time_limit_is_a_positive_number(solver: Callable[..., object], limit)
 def test_without_a_limit_fatrop_runs_here() -> None:
     for limit in (None, np.inf):
         solver = MultipleShooting(10, backend="fatrop", time_limit=limit)
-        assert solver.build(cart()).nlp.subprocess is None
+        assert solver.prepare(cart()).nlp.subprocess is None
 
 
 def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("solvers.direct.nlp_backends.SUBPROCESS_SUPPORTED", False)
     solver = MultipleShooting(10, backend="fatrop", time_limit=1.0)
     with pytest.warns(UserWarning, match="time limit of fatrop"):
-        program = solver.build(cart())
+        program = solver.prepare(cart())
     assert program.nlp.subprocess is None
     assert program.run().status is Status.SOLVED

@@ -4,11 +4,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, UnsupportedProblem, Work
+from ocp import OCP, RK4, InitialGuess, Integrator, Status, UnsupportedProblem, Work
 from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScalingSolver,
     check_instance,
     check_positive,
     check_whole,
@@ -19,7 +20,7 @@ from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
-class StagewiseNewton(Solver):
+class StagewiseNewton(ScalingSolver):
     r"""Newton's method on the program of ``MultipleShooting``, solved by a Riccati recursion.
 
     The same transcription, hence the same optimal value: controls held on N intervals, one
@@ -74,7 +75,7 @@ class StagewiseNewton(Solver):
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=True) if compiled else self
 
-    def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
+    def prepare(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
         check_instance(ocp, OCP, "stagewise Newton: the problem")
         _refuse(ocp)

@@ -124,7 +124,7 @@ def enumerate_extremals(
     ends = np.vstack([root.ends for root in roots])[np.argsort(costs, kind="stable")[:keep]]
     guesses = [_guess(motions, start, row, data.x0) for row in ends]
     solver = solver or IndirectShooting(_SEGMENTS, _FINE_STEPS, max_steps=_NEWTON_STEPS)
-    found = list(_exact(solver.build(ocp), data, guesses))
+    found = list(_exact(solver.prepare(ocp), data, guesses))
     return _enumeration(found, scans, Work(rollouts=motions.number))
 
 

@@ -1,0 +1,247 @@
+r"""Nominal sizes of states, controls, cost and rows, in which a problem is well scaled.
+
+They are found in logarithms by least squares, so that they follow every change of units. With T
+the horizon, and derivatives taken near start and guess, each of these asks two sizes to agree:
+
+.. math::
+
+    T \, |f_{i,x_j}| \, s_j = s_i, \qquad T \, |f_{i,u_j}| \, s_{u_j} = s_i, \qquad
+    T \, |L_{x_j}| \, s_j = s_J, \qquad |c_{x_j}| \, s_j = |c - b|
+
+and start, bounds, guess, T f at the start, and the cost itself are sizes by their numbers.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ocp.problem.constraint import Constraint
+from ocp.problem.ocp import OCP
+
+# How much each kind of knowledge counts: bounds, start and guess, dynamics, the rate at the start
+# (which fast dynamics keep up for much less than T), cost, rows.
+_BOUND, _GIVEN, _DYNAMICS, _RATE, _COST, _ROW = 2.0, 1.0, 1.0, 0.2, 0.3, 0.5
+# Rounds of least squares: the later ones take derivatives a size away from the start.
+_ROUNDS = 3
+# Where along the guess derivatives are taken.
+_FRACTIONS = np.array([0.0, 0.5, 1.0])
+
+
+# A free final time whose guess lies within these is measured in seconds.
+_ORDINARY = 1 / 16, 16.0
+
+
+def time_unit(ocp: OCP) -> float:
+    """Return what a free final time is measured in as an unknown [s]."""
+    low, high = _ORDINARY
+    if not ocp.has_free_time or low <= ocp.duration <= high:
+        return 1.0
+    return float(2.0 ** np.round(np.log2(ocp.duration)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sizes:
+    """What is large or small for a problem, in its own units; all positive.
+
+    Attributes:
+        x: of the states (nx,).
+        u: of the controls (nu,).
+        cost: of running cost over the horizon plus terminal cost.
+        rows: of the rows of each constraint, by name.
+    """
+
+    x: np.ndarray
+    u: np.ndarray
+    cost: float
+    rows: dict[str, np.ndarray]
+
+
+class _Point(NamedTuple):
+    """Where derivatives are taken: state, control, time, parameters."""
+
+    x: np.ndarray
+    u: np.ndarray
+    t: float
+    p: np.ndarray
+
+
+class _Equation(NamedTuple):
+    """weight * (sum of log sizes at ``plus`` - those at ``minus`` - ``value``) = 0."""
+
+    weight: float
+    plus: tuple[int, ...]
+    minus: tuple[int, ...]
+    value: float
+
+
+def nominal_sizes(ocp: OCP) -> Sizes:
+    """Return the nominal sizes of a problem; what the user declared as nominal stays."""
+    functions, points = _Functions.of(ocp), _points(ocp)
+    log_sizes = np.zeros(ocp.model.nx + ocp.model.nu + 1)
+    for k in range(_ROUNDS):
+        here = points if k == 0 else [*points, *_displaced(ocp, points, np.exp(log_sizes))]
+        equations = [*_given(ocp), *functions.rate_sizes(points[0])]
+        equations += [e for point in here for e in functions.equations(point)]
+        log_sizes = _solved(equations, len(log_sizes))
+    nx = ocp.model.nx
+    x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
+    if ocp.model.x_nominal is not None:
+        x = np.asarray(ocp.model.x_nominal, dtype=float)
+    if ocp.model.u_nominal is not None:
+        u = np.asarray(ocp.model.u_nominal, dtype=float)
+    last = [*points, *_displaced(ocp, points, np.concatenate([x, u, [1.0]]))]
+    rows = {c.name: functions.row_sizes(c, last, np.concatenate([x, u])) for c in ocp.constraints}
+    return Sizes(x, u, float(np.exp(log_sizes[-1])), rows)
+
+
+@dataclass(frozen=True, eq=False)
+class _Functions:
+    """Values and first derivatives of everything that relates sizes.
+
+    Attributes:
+        nx: states.
+        horizon: T, or the number of steps.
+        dynamics: (x, u, t, p) -> rate f, or the change of the state in a step; its Jacobian.
+        costs: -> running cost and its gradients in (x, u) and p; the same of the terminal cost.
+        constraints: by name: values and Jacobian in (x, u).
+    """
+
+    nx: int
+    horizon: float
+    dynamics: ca.Function
+    costs: ca.Function
+    constraints: dict[str, tuple[Constraint, ca.Function]]
+
+    @classmethod
+    def of(cls, ocp: OCP) -> "_Functions":
+        m, p = ocp.model, ocp.p
+        given, w = [m.x, m.u, m.t, p], ca.vertcat(m.x, m.u)
+        rate = m.f - m.x if m.is_discrete else m.f
+        outputs = []
+        for cost in (ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)):
+            outputs += [cost, ca.gradient(cost, w), ca.gradient(cost, p)]
+        constraints = {
+            c.name: (c, ca.Function("c", given, [c.expression, ca.jacobian(c.expression, w)]))
+            for c in ocp.constraints
+        }
+        return cls(
+            nx=m.nx,
+            horizon=float(ocp.steps or ocp.duration),
+            dynamics=ca.Function("f", given, [rate, ca.jacobian(rate, w)]),
+            costs=ca.Function("costs", given, [ca.densify(o) for o in outputs]),
+            constraints=constraints,
+        )
+
+    def equations(self, point: _Point) -> Iterator[_Equation]:
+        """Yield what derivatives and values at a point say of the sizes."""
+        yield from self._of_dynamics(point)
+        yield from self._of_costs(point)
+        for c, function in self.constraints.values():
+            value, jacobian = (np.array(v) for v in function(*point))
+            offset = _offset(c, value.ravel())
+            for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
+                if offset[i] > 0.0:
+                    size = float(np.log(offset[i]) - np.log(abs(jacobian[i, j])))
+                    yield _Equation(_ROW, (int(j),), (), size)
+
+    def rate_sizes(self, point: _Point) -> Iterator[_Equation]:
+        """Yield what the rate at a point says of the sizes by itself."""
+        rate = self.horizon * np.array(self.dynamics(*point)[0]).ravel()
+        for i in np.flatnonzero(_usable(rate)).tolist():
+            yield _Equation(_RATE, (i,), (), float(np.log(abs(rate[i]))))
+
+    def _of_dynamics(self, point: _Point) -> Iterator[_Equation]:
+        jacobian = self.horizon * np.array(self.dynamics(*point)[1])
+        for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
+            if i != j:
+                gain = float(np.log(abs(jacobian[i, j])))
+                yield _Equation(_DYNAMICS, (int(i),), (int(j),), gain)
+
+    def _of_costs(self, point: _Point) -> Iterator[_Equation]:
+        values = [np.array(v).ravel() for v in self.costs(*point)]
+        cost = len(values[1])  # its place among the sizes
+        for share, (value, slope, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
+            own = share * np.concatenate([value, by_p * point.p])
+            for size in own[_usable(own)]:
+                yield _Equation(_COST, (cost,), (), float(np.log(abs(size))))
+            for j in np.flatnonzero(_usable(slope)).tolist():
+                yield _Equation(_COST, (cost,), (j,), float(np.log(share * abs(slope[j]))))
+
+    def row_sizes(self, c: Constraint, points: Iterable[_Point], w: np.ndarray) -> np.ndarray:
+        """Return how much each row of a constraint changes along the sizes of x and u."""
+        if c.nominal is not None:
+            return np.broadcast_to(np.asarray(c.nominal, dtype=float), c.size).copy()
+        moved = [abs(np.array(self.constraints[c.name][1](*point)[1])) * w for point in points]
+        largest = np.max([np.where(np.isfinite(m), m, 0.0).max(axis=1) for m in moved], axis=0)
+        return np.where(largest > 0.0, largest, 1.0)
+
+
+def _points(ocp: OCP) -> list[_Point]:
+    """Return the start, and points along the guess."""
+    m, values = ocp.model, ocp.parameter_values()
+    u0 = ocp.control_bounds.clip(np.zeros(m.nu))
+    x, u = np.tile(ocp.start(), (3, 1)), np.tile(u0, (3, 1))
+    if ocp.guess is not None:
+        guess_x = ocp.guess.sample("x", _FRACTIONS, m.nx)
+        guess_u = ocp.guess.sample("u", _FRACTIONS, m.nu)
+        x, u = (x if guess_x is None else guess_x), (u if guess_u is None else guess_u)
+    times, p = ocp.duration * _FRACTIONS, values.at(_FRACTIONS)
+    return [_Point(*each) for each in zip(x, u, times, p, strict=True)]
+
+
+def _displaced(ocp: OCP, points: list[_Point], sizes: np.ndarray) -> list[_Point]:
+    """Return points a size away in every state and control, within the bounds."""
+    nx, rng = ocp.model.nx, np.random.default_rng(0)
+    found = []
+    for point in points:
+        sign = rng.choice([-1.0, 1.0], size=len(sizes) - 1)
+        x = ocp.state_bounds.clip(point.x + sign[:nx] * sizes[:nx])
+        u = ocp.control_bounds.clip(point.u + sign[nx:] * sizes[nx:-1])
+        found.append(point._replace(x=x, u=u))
+    return found
+
+
+def _given(ocp: OCP) -> Iterator[_Equation]:
+    """Yield what start, guess and bounds say of the sizes by themselves."""
+    m = ocp.model
+    rows = [(_GIVEN, 0, ocp.start()[None, :])]
+    if ocp.guess is not None:
+        for part, first, width in (("x", 0, m.nx), ("u", m.nx, m.nu)):
+            samples = ocp.guess.sample(part, _FRACTIONS, width)
+            if samples is not None:
+                rows.append((_GIVEN, first, samples))
+    for box, first in ((ocp.state_bounds, 0), (ocp.control_bounds, m.nx)):
+        bounds = np.vstack([np.asarray(box.lower, float), np.asarray(box.upper, float)])
+        rows.append((_BOUND, first, np.where(np.isfinite(bounds), bounds, 0.0)))
+    for weight, first, samples in rows:
+        largest = np.abs(samples).max(axis=0)
+        for j in np.flatnonzero(_usable(largest)).tolist():
+            yield _Equation(weight, (first + j,), (), float(np.log(largest[j])))
+
+
+def _offset(c: Constraint, value: np.ndarray) -> np.ndarray:
+    """Return how far the rows of a constraint are from their bounds; 0 where that says nothing."""
+    sides = np.vstack([np.asarray(c.lower, float), np.asarray(c.upper, float)]) - value
+    distance = np.where(np.isfinite(sides), np.abs(sides), 0.0).max(axis=0)
+    return np.where(_usable(distance), distance, 0.0)
+
+
+def _usable(values: np.ndarray) -> np.ndarray:
+    return np.isfinite(values) & (values != 0.0)
+
+
+def _solved(equations: Iterable[_Equation], size: int) -> np.ndarray:
+    """Return the logarithms by least squares, 0 for what nothing is known of."""
+    matrix, right = [], []
+    for weight, plus, minus, value in equations:
+        row = np.zeros(size)
+        row[list(plus)] += weight
+        row[list(minus)] -= weight
+        matrix.append(row)
+        right.append(weight * value)
+    if not matrix:
+        return np.zeros(size)
+    return np.linalg.lstsq(np.array(matrix), np.array(right), rcond=1e-9)[0]

@@ -1,0 +1,127 @@
+"""Solve a problem in sizes of its own, and return the solution in the units of the user."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
+from ocp.problem.scaled import ScaledOCP, scaled
+from ocp.problem.sizes import Sizes
+from ocp.solution.solution import Solution
+from ocp.solution.solver import InitialGuess, Program, Solver
+
+
+class ScalingSolver(Solver):
+    """A solver that iterates on numbers, and so measures a problem in sizes of its own.
+
+    Every tolerance and residual is relative to those sizes, see ``OCP.sizes``.
+    """
+
+    def build(self, ocp: OCP) -> Program:
+        """Do all symbolic work; a problem that is badly scaled is scaled first.
+
+        Raises:
+            UnsupportedProblem: naming the term that this method cannot treat.
+        """
+        in_sizes = scaled(ocp)
+        if in_sizes is None:
+            return self.prepare(ocp)
+        return ScaledProgram(in_sizes, self.prepare(in_sizes))
+
+    @abstractmethod
+    def prepare(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem in the units it is written in."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledProgram(Program):
+    """A program of the scaled problem, asked and answering in the user's units.
+
+    Attributes:
+        ocp: the scaled problem.
+        program: solves it.
+    """
+
+    ocp: ScaledOCP
+    program: Program
+
+    @property
+    def is_stateful(self) -> bool:
+        """Whether an answer depends on the runs before it."""
+        return self.program.is_stateful
+
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: InitialGuess | None = None,
+    ) -> Solution:
+        """Solve for these data, see ``Program.run``."""
+        started, original, sizes = perf_counter(), self.ocp.original, self.ocp.sizes
+        data = RunData.of(original, x0, t0, parameters)
+        given = original.first_guess(guess)
+        solution = self.program.run(
+            x0=data.x0 / sizes.x,
+            t0=t0,
+            parameters=parameters,
+            guess=None if given is None else _ScaledGuess(given, sizes),
+        )
+        answer = in_original_units(solution, self.ocp)
+        return answer.with_(x0=data.x0, solve_time=perf_counter() - started)
+
+
+def in_original_units(solution: Solution, ocp: ScaledOCP) -> Solution:
+    """Return a solution of a scaled problem as one of the original."""
+    sizes = ocp.sizes
+    history = {
+        name: values * sizes.cost if name == "cost" else values
+        for name, values in solution.history.items()
+    }
+    return solution.with_(
+        problem=ocp.original,
+        x=solution.x * sizes.x,
+        x0=solution.x0 * sizes.x,
+        u=solution.u * sizes.u,
+        costate=solution.costate * (sizes.cost / sizes.x),
+        cost=solution.cost * sizes.cost,
+        history=history,
+    )
+
+
+def in_own_units(solution: Solution, ocp: ScaledOCP) -> Solution:
+    """Return a solution of the original problem as one of the scaled problem."""
+    sizes = ocp.sizes
+    return solution.with_(
+        problem=ocp,
+        x=solution.x / sizes.x,
+        x0=solution.x0 / sizes.x,
+        u=solution.u / sizes.u,
+        costate=solution.costate * (sizes.x / sizes.cost),
+        cost=solution.cost / sizes.cost,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaledGuess:
+    """A guess in the user's units, sampled in sizes."""
+
+    guess: InitialGuess
+    sizes: Sizes
+
+    @property
+    def duration(self) -> float | None:
+        return self.guess.duration
+
+    def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
+        values = self.guess.sample(part, fractions, width)
+        if values is None:
+            return None
+        x, u, cost = self.sizes.x, self.sizes.u, self.sizes.cost
+        return values / {"x": x, "u": u, "costate": cost / x}[part]
