@@ -232,7 +232,7 @@ CALLS: list[tuple[str, Wrong]] = [
     ("hamiltonian: the problem is a Solution", lambda: hamiltonian(answer())),
     ("linear_quadratic: the problem is an int", lambda: linear_quadratic(*[3])),
     ("discretise: the problem is an int", lambda: discretise(*[3], 0.1)),
-    ("the problem to transcribe is a NoneType", lambda: ANY().build(None)),
+    ("MultipleShooting: the problem is a NoneType", lambda: ANY().build(None)),
     ("the problem to transcribe is an int", lambda: Transcription(*[3], 4, ANY())),
     # Where a run starts, and its numbers.
     ("the guess is <class 'numpy.ndarray'>, a Guess",

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.checks.arguments import check_instance
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled
@@ -28,6 +29,7 @@ class ScalingSolver(Solver):
         Raises:
             UnsupportedProblem: naming the term that this method cannot treat.
         """
+        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
         in_sizes = scaled(ocp)
         if in_sizes is None:
             return self.prepare(ocp)

@@ -114,7 +114,7 @@ def test_what_it_does_not_see() -> None:
     assert evaluate(found.solution).cost > 2.0 + 1e-4
     # And a state bound is kept at the points only: between them the path gains by it.
     start = solve(bryson_denham(), MultipleShooting(40))
-    verdict = evaluate(refine_mesh(start).solution)
+    verdict = evaluate(refine_mesh(start, accuracy=3e-8).solution)
     assert 4.0 * (1.0 - 1e-5) < verdict.cost < 4.0 - 1e-7
     assert verdict.violation > 1e-8
 
