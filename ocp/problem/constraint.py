@@ -82,7 +82,7 @@ class Constraint:
         at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
             manifold, and ``x0`` a guess) or ``"terminal"``.
         nominal: a typical size of the rows, a number or (m,), to measure a violation by; None: it
-            is estimated, see ``OCP.sizes``.
+            is estimated, see ``Solution.sizes``.
 
     Raises:
         ProblemError: naming the constraint and what is wrong with place, expression or bounds.

@@ -35,7 +35,7 @@ class Model:
         x_units: a unit for each state, for plots and messages.
         u_units: a unit for each control.
         x_nominal: a typical size of each state, a number or (nx,), for solvers to measure it by;
-            None: they estimate it, see ``OCP.sizes``.
+            None: they estimate it, see ``Solution.sizes``.
         u_nominal: the same of the controls (nu,).
 
     Raises:

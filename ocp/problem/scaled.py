@@ -24,7 +24,7 @@ from ocp.problem.sizes import Sizes, nominal_sizes
 InSizes = Callable[[ca.SX | float, np.ndarray | float], ca.SX]
 
 # A problem whose sizes lie within these is left as it is.
-_WELL_SCALED, _WELL_SCALED_COST = (1e-3, 1e3), (1e-5, 1e7)
+_WELL_SCALED, _WELL_SCALED_COST = (1e-3, 1e3), (1e-4, 1e4)
 # Sizes are rounded to powers of this: to multiply by them loses no digit.
 _BASE = 2.0
 

@@ -6,7 +6,8 @@ the horizon, and derivatives taken near start and guess, each of these asks two 
 .. math::
 
     T \, |f_{i,x_j}| \, s_j = s_i, \qquad T \, |f_{i,u_j}| \, s_{u_j} = s_i, \qquad
-    T \, |L_{x_j}| \, s_j = s_J, \qquad |c_{x_j}| \, s_j = |c - b|
+    T \, |L_{x_j}| \, s_j = s_J, \qquad T \, |L_{x_j x_j}| \, s_j^2 = s_J, \qquad
+    |c_{x_j}| \, s_j = |c - b|
 
 and start, bounds, guess, T f at the start, and the cost itself are sizes by their numbers.
 """
@@ -24,20 +25,22 @@ from ocp.problem.ocp import OCP
 # How much each kind of knowledge counts: bounds, start and guess, dynamics, the rate at the start
 # (which fast dynamics keep up for much less than T), cost, rows.
 _BOUND, _GIVEN, _DYNAMICS, _RATE, _COST, _ROW = 2.0, 1.0, 1.0, 0.2, 0.3, 0.5
+# What is left of terms that cancel, relative to them, is rounding.
+_ROUNDING = 1e-9
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # Where along the guess derivatives are taken.
 _FRACTIONS = np.array([0.0, 0.5, 1.0])
 
 
-# A free final time whose guess lies within these is measured in seconds.
+# Where the horizon lies within these, seconds are a good unit of time [s].
 _ORDINARY = 1 / 16, 16.0
 
 
 def time_unit(ocp: OCP) -> float:
-    """Return what a free final time is measured in as an unknown [s]."""
+    """Return in what unit times of the order of the horizon are numbers near 1 [s]."""
     low, high = _ORDINARY
-    if not ocp.has_free_time or low <= ocp.duration <= high:
+    if ocp.model.is_discrete or low <= ocp.duration <= high:
         return 1.0
     return float(2.0 ** np.round(np.log2(ocp.duration)))
 
@@ -81,10 +84,11 @@ def nominal_sizes(ocp: OCP) -> Sizes:
     """Return the nominal sizes of a problem; what the user declared as nominal stays."""
     functions, points = _Functions.of(ocp), _points(ocp)
     log_sizes = np.zeros(ocp.model.nx + ocp.model.nu + 1)
-    for k in range(_ROUNDS):
-        here = points if k == 0 else [*points, *_displaced(ocp, points, np.exp(log_sizes))]
+    for _ in range(_ROUNDS):
         equations = [*_given(ocp), *functions.rate_sizes(points[0])]
-        equations += [e for point in here for e in functions.equations(point)]
+        for point, beside in zip(points, _displaced(ocp, points, np.exp(log_sizes)), strict=True):
+            equations += [*functions.equations(point), *functions.of_costs(point)]
+            equations += [*functions.equations(beside), *functions.of_curvature(point, beside)]
         log_sizes = _solved(equations, len(log_sizes))
     nx = ocp.model.nx
     x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
@@ -136,9 +140,8 @@ class _Functions:
         )
 
     def equations(self, point: _Point) -> Iterator[_Equation]:
-        """Yield what derivatives and values at a point say of the sizes."""
+        """Yield what dynamics and constraints at a point say of the sizes."""
         yield from self._of_dynamics(point)
-        yield from self._of_costs(point)
         for c, function in self.constraints.values():
             value, jacobian = (np.array(v) for v in function(*point))
             offset = _offset(c, value.ravel())
@@ -149,8 +152,10 @@ class _Functions:
 
     def rate_sizes(self, point: _Point) -> Iterator[_Equation]:
         """Yield what the rate at a point says of the sizes by itself."""
-        rate = self.horizon * np.array(self.dynamics(*point)[0]).ravel()
-        for i in np.flatnonzero(_usable(rate)).tolist():
+        rate, jacobian = (np.array(v) for v in self.dynamics(*point))
+        rate = self.horizon * rate.ravel()
+        terms = self.horizon * np.abs(jacobian) @ np.abs(np.concatenate([point.x, point.u]))
+        for i in np.flatnonzero(_usable(rate) & (np.abs(rate) > _ROUNDING * terms)).tolist():
             yield _Equation(_RATE, (i,), (), float(np.log(abs(rate[i]))))
 
     def _of_dynamics(self, point: _Point) -> Iterator[_Equation]:
@@ -160,7 +165,19 @@ class _Functions:
                 gain = float(np.log(abs(jacobian[i, j])))
                 yield _Equation(_DYNAMICS, (int(i),), (int(j),), gain)
 
-    def _of_costs(self, point: _Point) -> Iterator[_Equation]:
+    def of_curvature(self, point: _Point, beside: _Point) -> Iterator[_Equation]:
+        """Yield what the change of the cost's slopes between two points says of the sizes."""
+        here, there = ([np.array(v).ravel() for v in self.costs(*at)] for at in (point, beside))
+        moved = np.concatenate([beside.x - point.x, beside.u - point.u])
+        for share, i in ((self.horizon, 1), (1.0, 4)):
+            change = there[i] - here[i]
+            change[np.abs(change) <= _ROUNDING * np.abs(here[i])] = 0.0
+            for j in np.flatnonzero(_usable(change) & _usable(moved)).tolist():
+                curvature = share * abs(change[j] / moved[j])
+                yield _Equation(_COST, (len(moved),), (j, j), float(np.log(curvature)))
+
+    def of_costs(self, point: _Point) -> Iterator[_Equation]:
+        """Yield what values and slopes of the cost at a point say of the sizes."""
         values = [np.array(v).ravel() for v in self.costs(*point)]
         cost = len(values[1])  # its place among the sizes
         for share, (value, slope, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
@@ -225,8 +242,10 @@ def _given(ocp: OCP) -> Iterator[_Equation]:
 def _offset(c: Constraint, value: np.ndarray) -> np.ndarray:
     """Return how far the rows of a constraint are from their bounds; 0 where that says nothing."""
     sides = np.vstack([np.asarray(c.lower, float), np.asarray(c.upper, float)]) - value
-    distance = np.where(np.isfinite(sides), np.abs(sides), 0.0).max(axis=0)
-    return np.where(_usable(distance), distance, 0.0)
+    distance = np.where(np.isfinite(sides), np.abs(sides), 0.0)
+    distance[distance <= _ROUNDING * np.abs(value)] = 0.0
+    largest = distance.max(axis=0)
+    return np.where(_usable(largest), largest, 0.0)
 
 
 def _usable(values: np.ndarray) -> np.ndarray:
@@ -238,8 +257,8 @@ def _solved(equations: Iterable[_Equation], size: int) -> np.ndarray:
     matrix, right = [], []
     for weight, plus, minus, value in equations:
         row = np.zeros(size)
-        row[list(plus)] += weight
-        row[list(minus)] -= weight
+        np.add.at(row, list(plus), weight)
+        np.subtract.at(row, list(minus), weight)
         matrix.append(row)
         right.append(weight * value)
     if not matrix:

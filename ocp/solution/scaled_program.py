@@ -20,7 +20,7 @@ from ocp.solution.solver import InitialGuess, Program, Solver
 class ScalingSolver(Solver):
     """A solver that iterates on numbers, and so measures a problem in sizes of its own.
 
-    Every tolerance and residual is relative to those sizes, see ``OCP.sizes``.
+    Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.
     """
 
     def build(self, ocp: OCP) -> Program:

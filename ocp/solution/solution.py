@@ -16,6 +16,8 @@ from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
+from ocp.problem.scaled import scaled, sizes_of
+from ocp.problem.sizes import Sizes
 from ocp.solution.archive import read_archive, write_archive
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.status import Status
@@ -161,6 +163,16 @@ class Solution:
     def fractions(self) -> np.ndarray:
         """The nodes as fractions of the horizon, from 0 to 1."""
         return (self.t - self.t[0]) / self.duration
+
+    @property
+    def sizes(self) -> Sizes:
+        """What states, controls, cost and rows are measured by: tolerances are relative to it."""
+        return sizes_of(self.problem)
+
+    @property
+    def is_scaled(self) -> bool:
+        """Whether solvers scale the problem by its sizes; one that is well scaled they do not."""
+        return scaled(self.problem) is not None
 
     @property
     def data(self) -> RunData:

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Integrator, UnsupportedProblem
-from ocp.internal import BufferedFunction, RunData, Stage, compiled, hamiltonian
+from ocp.internal import BufferedFunction, RunData, Stage, compiled, hamiltonian, time_unit
 from solvers.gradient.line_search import LineSearchTrial
 
 
@@ -79,7 +79,8 @@ class Objective:
         sweeps: the integrations.
         data: of the run.
         nodes: as fractions of the horizon, (N + 1,).
-        h: length of an interval [s], the weight of a gradient; 1 in discrete time.
+        h: length of an interval [s]; 1 in discrete time.
+        weight: of a control in the inner product: h in the problem's unit of time.
         rollouts: integrations forwards so far.
         backward: integrations backwards so far.
     """
@@ -90,6 +91,7 @@ class Objective:
         self.sweeps, self.data, self.box = sweeps, data, ocp.control_bounds
         self.nodes = np.linspace(0.0, 1.0, n + 1)
         self.h = 1.0 if ocp.model.is_discrete else ocp.duration / n
+        self.weight = self.h / time_unit(ocp)
         left, right = data.values.on(self.nodes)
         t = data.t0 + self.nodes[None, :-1] * ocp.duration
         self._schedule = [t, np.full((1, n), self.h), left.T, right.T]
@@ -118,7 +120,7 @@ class Objective:
         costate = np.vstack([costate.T[::-1], final])
         if not (np.isfinite(costate).all() and np.isfinite(gradient).all()):
             return self._at_rest(trial.u)
-        return ControlIterate(trial, costate, gradient.T[::-1] / self.h)
+        return ControlIterate(trial, costate, gradient.T[::-1] / self.weight)
 
     def _at_rest(self, u: np.ndarray) -> ControlIterate:
         """What there is to show of controls along which something blows up."""
@@ -141,7 +143,7 @@ class Objective:
 
     def inner(self, a: np.ndarray, b: np.ndarray) -> float:
         """(a, b), the integral of a'b over the horizon: Algorithm 2's inner product."""
-        return self.h * float(np.vdot(a, b))
+        return self.weight * float(np.vdot(a, b))
 
 
 def _costate_step(ocp: OCP, integrator: Integrator) -> ca.Function:

@@ -12,6 +12,7 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
+    Program,
     Status,
     UnsupportedProblem,
     Work,
@@ -95,6 +96,10 @@ class Schuetz(ScalingSolver):
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Schuetz":
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=True) if compiled else self
+
+    def build(self, ocp: OCP) -> Program:
+        """Build it; a fixed step has units, and is taken in those of the problem as written."""
+        return self.prepare(ocp) if isinstance(self.step, FixedStep) else super().build(ocp)
 
     def prepare(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""

@@ -1,0 +1,185 @@
+"""The same problem in other units has the same answer: status, cost, states, effort."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from benchmarks.cases import all_cases
+from models.textbook import van_der_pol
+from ocp import OCP, Box, Constraint, Model, ProblemError, Solver, Status, evaluate, solve
+from ocp.internal import scaled, sizes_of
+from solvers import (
+    Collocation,
+    IndirectShooting,
+    LinearMPC,
+    MultipleShooting,
+    StagewiseNewton,
+    polish,
+)
+from tests.units.changed_units import Units
+
+# Left out: where the minimum is so flat (fuller, beam: singular arcs) or the grid so coarse
+# (hypersensitive, hanging chain) that the answer of the interior-point method at its tolerance
+# differs in the sixth digit; and those whose iterations differ by more than half.
+FLAT = {
+    "beam", "fuller", "hypersensitive", "linear-hypersensitive", "hanging-chain", "turnpike",
+    "pendulum-minimum-time", "cart-pole-swing-up", "two-link-arm-minimum-time",
+    "exponential-minimum-time", "double-integrator-minimum-time",
+}  # fmt: skip
+CASES = [c for c in all_cases() if c.suite == "library" and c.name not in FLAT]
+QUICK = {"van-der-pol", "bryson-denham", "brachistochrone", "catalyst-mixing", "mass-tracking"}
+SOLVERS: tuple[Solver, ...] = (MultipleShooting(40), Collocation(15))
+
+
+def same_in_other_units(ocp: OCP, solver: Solver, seed: int) -> None:
+    units = Units.drawn(ocp, seed)
+    plain, other = solve(ocp, solver), solve(units.of(ocp), solver)
+    again = units.back(other, ocp)
+    assert again.status is plain.status, other.message
+    assert again.cost == pytest.approx(plain.cost, rel=1e-6, abs=1e-9 * sizes_of(ocp).cost)
+    assert abs(other.iterations - plain.iterations) <= 0.5 * plain.iterations + 2
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=["shooting", "collocation"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(c, id=c.name, marks=[] if c.name in QUICK else [pytest.mark.slow])
+        for c in CASES
+    ],
+)
+def test_direct_methods(case, solver) -> None:
+    if isinstance(solver, Collocation) and case.build().model.is_discrete:
+        pytest.skip("collocation takes no discrete-time model")
+    same_in_other_units(case.build(), solver, seed=sum(map(ord, case.name)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_newton(seed) -> None:
+    same_in_other_units(van_der_pol(), StagewiseNewton(40), seed)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_polished_answer(seed) -> None:
+    ocp = van_der_pol()
+    units = Units.drawn(ocp, seed)
+    plain = polish(solve(ocp, MultipleShooting(40)))
+    other = polish(solve(units.of(ocp), MultipleShooting(40)))
+    assert other.status is plain.status is Status.SOLVED
+    again = units.back(other, ocp)
+    assert again.cost == pytest.approx(plain.cost, rel=1e-9)
+    np.testing.assert_allclose(again.x, plain.x, atol=1e-7)
+    np.testing.assert_allclose(again.costate, plain.costate, atol=1e-7)
+    start = solve(units.of(ocp), MultipleShooting(40))
+    shot = solve(units.of(ocp), IndirectShooting(segments=15), guess=start)
+    assert units.back(shot, ocp).cost == pytest.approx(plain.cost, rel=1e-6)
+
+
+def random_program(seed: int) -> OCP:
+    """Linear, quadratic, bounded: a quadratic program of LinearMPC."""
+    rng = np.random.default_rng(seed)
+    n, m = int(rng.integers(1, 4)), int(rng.integers(1, 3))
+    x, u = ca.SX.sym("x", n), ca.SX.sym("u", m)
+    a, b = np.eye(n) + 0.3 * rng.normal(size=(n, n)), rng.normal(size=(n, m))
+    path = Constraint("row", rng.normal(size=(1, n)) @ x + rng.normal(size=(1, m)) @ u, -9.0, 9.0)
+    return OCP(
+        name=f"random program {seed}",
+        model=Model(name="linear", x=x, u=u, f=a @ x + b @ u, dt=0.1),
+        x0=rng.normal(size=n),
+        horizon=8,
+        running_cost=ca.sumsqr(x) + 0.1 * ca.sumsqr(u),
+        terminal_cost=ca.sumsqr(x),
+        control_bounds=Box(-1.0, 1.0),
+        constraints=(path,),
+    )
+
+
+@pytest.mark.parametrize("backend", ["osqp", "quadprog"])
+@pytest.mark.parametrize("seed", range(25))
+def test_linear_mpc(seed, backend) -> None:
+    ocp = random_program(seed)
+    units = Units.drawn(ocp, seed)
+    plain, other = (
+        solve(ocp, LinearMPC(backend=backend)),
+        solve(units.of(ocp), LinearMPC(backend=backend)),
+    )
+    assert other.status is plain.status
+    if plain.status.is_success:
+        assert other.cost / units.cost == pytest.approx(plain.cost, rel=1e-6)
+        np.testing.assert_allclose(other.u / units.u, plain.u, atol=1e-5)
+
+
+def test_an_axis_in_pascal_moves() -> None:
+    """1 mm, |p| <= 2 MPa: the same as a double integrator with |u| <= 2."""
+    x, p = ca.SX.sym("x", 2), ca.SX.sym("p")
+    force = 1e-9 * p
+    axis = OCP(
+        name="axis",
+        model=Model(
+            name="axis",
+            x=x,
+            u=p,
+            f=ca.vertcat(x[0] + 0.1 * x[1] + 0.005 * force, x[1] + 0.1 * force),
+            dt=0.1,
+        ),
+        x0=[1e-3, 0.0],
+        horizon=20,
+        running_cost=1e7 * x[0] ** 2 + 1e6 * x[1] ** 2 + 1e-13 * p**2,
+        terminal_cost=1e7 * x[0] ** 2 + 1e6 * x[1] ** 2,
+        control_bounds=Box(-2e6, 2e6),
+    )
+    for solver in (LinearMPC(), LinearMPC(form="condensed"), MultipleShooting()):
+        solution = solve(axis, solver).or_raise()
+        assert solution.u[0, 0] == pytest.approx(-2e6, rel=1e-6)
+        assert evaluate(solution).cost == pytest.approx(72.3236677, rel=1e-6)
+
+
+def test_messages_speak_in_the_units_of_the_user() -> None:
+    """A door 1 km too far away for a cart that may go 1 m/s for 10 s, in micrometres."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    ocp = OCP(
+        name="far",
+        model=Model(name="cart", x=x, u=u, f=u),
+        x0=0.0,
+        horizon=10.0,
+        running_cost=u**2,
+        control_bounds=Box(-1e6, 1e6),
+        constraints=(Constraint("door", x, 1e9, 1e9, at="terminal"),),
+    )
+    assert scaled(ocp) is not None
+    solution = solve(ocp, MultipleShooting(10))
+    assert solution.is_scaled
+    assert solution.sizes.u.tolist() == pytest.approx([1e6], rel=10.0)
+    assert solution.status is Status.INFEASIBLE
+    assert "constraint 'door' is violated by 9.9e+08 at t = 10 s" in solution.message
+
+
+def test_sizes_follow_the_units() -> None:
+    for case in CASES[:12]:
+        ocp = case.build()
+        units, sizes = Units.drawn(ocp, 1), sizes_of(ocp)
+        other = sizes_of(units.of(ocp))
+        np.testing.assert_allclose(other.x, sizes.x * units.x, rtol=1e-6)
+        np.testing.assert_allclose(other.u, sizes.u * units.u, rtol=1e-6)
+        assert other.cost == pytest.approx(sizes.cost * units.cost, rel=1e-6)
+
+
+def test_what_the_user_declares_is_the_size() -> None:
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    model = Model(name="m", x=x, u=u, f=ca.vertcat(x[1], u), x_nominal=[10.0, 0.1], u_nominal=3.0)
+    end = Constraint("end", x, 0.0, 0.0, at="terminal", nominal=[5.0, 7.0])
+    ocp = OCP(
+        name="m", model=model, x0=[1.0, 0.0], horizon=1.0, running_cost=u**2, constraints=(end,)
+    )
+    sizes = sizes_of(ocp)
+    assert (sizes.x.tolist(), sizes.u.tolist()) == ([10.0, 0.1], [3.0])
+    assert sizes.rows["end"].tolist() == [5.0, 7.0]
+
+
+@pytest.mark.parametrize("nominal", [0.0, -1.0, np.nan, np.inf, [1.0, 2.0, 3.0], "big"])
+def test_nominal_sizes_are_positive_numbers(nominal) -> None:
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    with pytest.raises(ProblemError, match="model 'm': x_nominal"):
+        Model(name="m", x=x, u=u, f=ca.vertcat(x[1], u), x_nominal=nominal)
+    with pytest.raises(ProblemError, match="constraint 'c': nominal"):
+        Constraint("c", x, 0.0, 0.0, at="terminal", nominal=nominal)
