@@ -81,10 +81,12 @@ def random_program(seed: int) -> OCP:
     n, m = int(rng.integers(1, 4)), int(rng.integers(1, 3))
     x, u = ca.SX.sym("x", n), ca.SX.sym("u", m)
     a, b = np.eye(n) + 0.3 * rng.normal(size=(n, n)), rng.normal(size=(n, m))
-    path = Constraint("row", rng.normal(size=(1, n)) @ x + rng.normal(size=(1, m)) @ u, -9.0, 9.0)
+    path = Constraint(
+        "row", ca.DM(rng.normal(size=(1, n))) @ x + ca.DM(rng.normal(size=(1, m))) @ u, -9.0, 9.0
+    )
     return OCP(
         name=f"random program {seed}",
-        model=Model(name="linear", x=x, u=u, f=a @ x + b @ u, dt=0.1),
+        model=Model(name="linear", x=x, u=u, f=ca.DM(a) @ x + ca.DM(b) @ u, dt=0.1),
         x0=rng.normal(size=n),
         horizon=8,
         running_cost=ca.sumsqr(x) + 0.1 * ca.sumsqr(u),
