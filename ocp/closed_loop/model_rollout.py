@@ -40,18 +40,22 @@ class RolloutResult(NamedTuple):
 class ModelRollout:
     """Roll-outs of a problem over N intervals, and the check of its constraints.
 
-    The state at the first node is measured: nothing can be done about it, so only what
-    depends on the control is checked there.
+    The state at the first node is measured and cannot be changed: only what depends on the
+    control is checked there. At the last node a plan has no control, as in the program of its
+    solver, so only what depends on the state alone is checked; of a plant in continuous time the
+    last control acts up to that instant.
 
     Attributes:
         ocp: the problem.
         n: number of intervals.
         compiled: whether the model runs as machine code.
+        control_at_end: whether the last control still acts at the last node.
     """
 
     ocp: OCP
     n: int
     compiled: bool = False
+    control_at_end: bool = False
 
     def of(
         self, x0: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
@@ -80,7 +84,7 @@ class ModelRollout:
         if rows.path:
             nodes = np.vstack([p[0], p[1][-1:]])
             values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
-            found.append(rows.path.largest_violation(values, t, exempt=self._decided_by_start))
+            found.append(rows.path.largest_violation(values, t, exempt=self._exempt))
         return _in_words(max(found, key=_amount))
 
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
@@ -101,12 +105,13 @@ class ModelRollout:
         return BufferedFunction(self.ocp.functions.path.map(self.n + 1))
 
     @cached_property
-    def _decided_by_start(self) -> np.ndarray:
-        """Where path constraints follow from the measured state alone, bool (N + 1, m)."""
+    def _exempt(self) -> np.ndarray:
+        """Where path constraints do not hold, bool (N + 1, m), see the class."""
         rows = self.ocp.rows.path
-        decided = np.zeros((self.n + 1, len(rows)), dtype=bool)
-        decided[0] = ~rows.on_control
-        return decided
+        exempt = np.zeros((self.n + 1, len(rows)), dtype=bool)
+        exempt[0] = ~rows.on_control
+        exempt[-1] |= rows.on_control & (not self.control_at_end)
+        return exempt
 
 
 @once_per_problem

@@ -88,7 +88,9 @@ class RunningPlant:
         self.plant, self.t, self.x = plant, 0.0, np.array(x0)
         self._rng = np.random.default_rng(seed)
         self._acting: np.ndarray | None = None
-        self._model = ModelRollout(plant.ocp, 1 if plant.ocp.model.is_discrete else plant.substeps)
+        discrete = plant.ocp.model.is_discrete
+        steps = 1 if discrete else plant.substeps
+        self._model = ModelRollout(plant.ocp, steps, control_at_end=not discrete)
         self._declared = plant.ocp.parameter_values().at(0.0)[0]
 
     def measure(self) -> np.ndarray:
