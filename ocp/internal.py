@@ -18,13 +18,13 @@ from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
-from ocp.nlp.program_rows import most_violated
 from ocp.nlp.transcription import Transcription
+from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
+from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
-from ocp.problem.sizes import Sizes, time_unit
 from ocp.problem.start_feasibility import start_violation
 from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated

@@ -75,17 +75,14 @@ from ocp import (
     with_input_rate,
     with_stationary_end,
 )
-from ocp.internal import (
-    Transcription,
-    c_code,
-    compiled,
-    differentiable_step,
-    hamiltonian,
-    stage_hessian,
-    start_violation,
-    stationary,
-    symbol_type,
-)
+from ocp.codegen.compile import c_code, compiled
+from ocp.integration.differentiable_step import differentiable_step
+from ocp.integration.stage_hessian import stage_hessian
+from ocp.linear.stationary import stationary
+from ocp.minimum_principle.hamiltonian import hamiltonian
+from ocp.minimum_principle.necessary_conditions import symbol_type
+from ocp.nlp.transcription import Transcription
+from ocp.problem.start_feasibility import start_violation
 from solvers import (
     GPC,
     Armijo,
@@ -120,7 +117,7 @@ from solvers import (
     repel,
     track,
 )
-from solvers.internal import seeds_around, self_motions
+from solvers.indirect.reverse.self_motion import seeds_around, self_motions
 
 
 @cache

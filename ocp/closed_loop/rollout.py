@@ -18,7 +18,8 @@ from ocp.solution.archive import read_archive, write_archive
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SOURCES = tuple(InputSource)
+# Older files have the place of a source in this list instead of its name.
+_OLDER_SOURCES = ("OPTIMAL", "FEASIBLE", "SHIFTED", "BACKUP")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -146,7 +147,7 @@ class Rollout:
         """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
-            "outcomes": np.array([_SOURCES.index(o) for o in self.sources], dtype=int),
+            "outcomes": np.array([source.name for source in self.sources], dtype=str),
             "messages": np.array(self.messages, dtype=str),
             "plant": self.plant.name,
         }
@@ -168,16 +169,25 @@ class Rollout:
             raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
         if other := differing_in(data, plant):
             raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
-        if not np.isin(data["outcomes"], range(len(_SOURCES))).all():
+        names = _names_of(data["outcomes"])
+        if not set(names) <= set(InputSource.__members__):
             raise ProblemError(f"{path} is no saved rollout: a source is none of the four")
         return cls(
             plant=plant,
             **{name: data[name] for name in _ARRAYS},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
-            sources=tuple(_SOURCES[i] for i in data["outcomes"]),
+            sources=tuple(InputSource[name] for name in names),
             messages=tuple(map(str, data["messages"])),
         )
 
 
 _ARRAYS = ("t", "x", "measured", "inputs", "costs", "step_times", "clipped")
 _SCALARS = {"violation": float, "worst": str, "drift": float, "ended": str, "late": int}
+
+
+def _names_of(sources: np.ndarray) -> list[str]:
+    """Return the names of the sources in a file; a place that is none stays a number."""
+    if sources.dtype.kind not in "iu":
+        return [str(name) for name in sources]
+    older = dict(enumerate(_OLDER_SOURCES))
+    return [older.get(int(place), str(place)) for place in sources]

@@ -10,11 +10,11 @@ from ocp.checks.arguments import check_instance
 from ocp.codegen.compile import compiled
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import Integrator, Stage
-from ocp.nlp.program_rows import most_violated
+from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
+from ocp.problem.nominal_sizes import time_unit
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
-from ocp.problem.sizes import time_unit
 
 
 @dataclass(frozen=True, eq=False)

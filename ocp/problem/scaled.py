@@ -18,8 +18,8 @@ from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
 from ocp.problem.model import Model
+from ocp.problem.nominal_sizes import Sizes, nominal_sizes
 from ocp.problem.ocp import OCP
-from ocp.problem.sizes import Sizes, nominal_sizes
 
 InSizes = Callable[[ca.SX | float, np.ndarray | float], ca.SX]
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
+from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled
-from ocp.problem.sizes import Sizes
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program, Solver
 

@@ -14,10 +14,10 @@ from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
+from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
-from ocp.problem.sizes import Sizes
 from ocp.solution.archive import read_archive, write_archive
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.status import Status

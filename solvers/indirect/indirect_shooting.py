@@ -5,16 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from ocp import (
-    OCP,
-    RK4,
-    InitialGuess,
-    Integrator,
-    ProblemError,
-    Solution,
-    UnsupportedProblem,
-    Work,
-)
+from ocp import OCP, RK4, InitialGuess, Integrator, ProblemError, Solution, UnsupportedProblem, Work
 from ocp.internal import (
     MethodProgram,
     RunData,

@@ -17,7 +17,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
-from solvers.tabular.one_step import OneStep, one_step
+from solvers.tabular.greedy_step import OneStep, one_step
 from solvers.tabular.refusal import refuse_free_ends
 
 

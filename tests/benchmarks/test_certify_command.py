@@ -9,7 +9,7 @@ from benchmarks.cases import all_cases
 from benchmarks.cases.library.certificates import Certificates
 from benchmarks.sweep.row import versions
 from solvers import Certificate, MultipleShooting
-from solvers.internal import Check, Estimate, Verdict
+from solvers.certify.certificate import Check, Estimate, Verdict
 
 
 def certificate(verdict: Verdict) -> Certificate:

@@ -19,12 +19,12 @@ from solvers import Collocation
 from solvers.certify.arc_conditions import ArcConditions
 from solvers.certify.arc_shooting import ArcShooting
 from solvers.certify.by_arcs import by_arcs
+from solvers.certify.certificate import Verdict
 from solvers.certify.control_arcs import Arc, NoArcsError, arcs_of
 from solvers.certify.estimates import NoEstimateError
 from solvers.certify.global_evidence import other_data
 from solvers.certify.hamiltonian_check import hamiltonian_check
 from solvers.certify.time_scaled_problem import TimeScaledProblem
-from solvers.internal import Verdict
 from tests.tolerances import DERIVATIVE, STEP
 
 

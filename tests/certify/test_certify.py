@@ -10,12 +10,11 @@ from benchmarks.cases import TEXTBOOK, Case, all_cases
 from models.textbook import bryson_denham, double_integrator_energy
 from ocp import Box, Guess, ProblemError, UnsupportedProblem, evaluate, solve
 from solvers import Certificate, CertifyOptions, MultipleShooting, certify
-from solvers.certify.certificate import CONVEXITY, STARTS
+from solvers.certify.certificate import CONVEXITY, STARTS, Estimate, Verdict
 from solvers.certify.certify import RELATIVE
 from solvers.certify.estimates import NoEstimateError, by_polish
 from solvers.certify.global_evidence import EXTREMALS, every_extremal, other_starts
 from solvers.certify.grid_conditions import CHECKS as GRID
-from solvers.internal import Estimate, Verdict
 from tests.certify.test_parts import integrator
 
 QUICK = CertifyOptions(starts=1, enumerate=False)

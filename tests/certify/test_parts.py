@@ -10,12 +10,11 @@ from benchmarks.cases import LIBRARY
 from models.textbook import beam, bryson_denham, double_integrator_energy, van_der_pol
 from ocp import OCP, Box, Constraint, FreeTime, Model, Signal, evaluate, solve
 from solvers import Certificate, Collocation, MultipleShooting, polish
-from solvers.certify.certificate import AGREEMENT, agreement
+from solvers.certify.certificate import AGREEMENT, Check, Estimate, Verdict, agreement
 from solvers.certify.estimates import extrapolated
 from solvers.certify.global_evidence import convexity, other_data
 from solvers.certify.grid_conditions import grid_checks
 from solvers.certify.hamiltonian_check import hamiltonian_check
-from solvers.internal import Check, Estimate, Verdict
 
 LIMIT = 1e-6
 

@@ -36,7 +36,7 @@ from ocp import (
     replay,
     solve,
 )
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import Collocation, IndirectShooting, Mesh, MultipleShooting, Schuetz, polish
 from solvers.collocation.collocation_points import Family
 from tests.mpc.problems import cart

@@ -8,8 +8,9 @@ import pytest
 
 from benchmarks.mistakes import problems as of
 from ocp import OCP, Box, Constraint, FreeTime, Guess, Model, Signal
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import MultipleShooting, diagnose
+from solvers.diagnose.cause import Cause
 from solvers.diagnose.checks.curvature import curvature
 from solvers.diagnose.checks.degrees import degrees
 from solvers.diagnose.checks.duplicate import duplicate
@@ -27,9 +28,8 @@ from solvers.diagnose.checks.vacuous import vacuous
 from solvers.diagnose.conditioning import conditioning
 from solvers.diagnose.diagnose import _BEFORE
 from solvers.diagnose.elastic_program import Demand, ElasticProgram
-from solvers.diagnose.finding import Finding
+from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem
-from solvers.internal import Cause, Severity
 from tests.tolerances import MINIMISER
 
 # What the elastic problem leaves over: IPOPT's 1e-8, and the weight of its tie break.

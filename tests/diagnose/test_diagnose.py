@@ -11,7 +11,8 @@ from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.judge import GOAL, judged, share
 from ocp import Box, Euler, ProblemError, solve
 from solvers import Diagnosis, Finding, MultipleShooting, diagnose, polish
-from solvers.internal import Cause, Severity
+from solvers.diagnose.cause import Cause
+from solvers.diagnose.finding import Severity
 from tests.ocp.problems import energy, lag, pendulum
 
 # Where finding and plant differ, and the page says why.

@@ -10,7 +10,8 @@ from qpsolvers import solve_qp
 
 from ocp import ProblemError
 from solvers import Damped, Exact, Filtered
-from solvers.internal import Inverse, Level, prioritised_velocity
+from solvers.kinematic.hierarchy import Level, prioritised_velocity
+from solvers.kinematic.pseudo_inverse import Inverse
 
 # The issue: 3.11 against a QP, and the first task against whatever the second is.
 QP = 1e-9

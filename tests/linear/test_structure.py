@@ -25,7 +25,7 @@ from ocp import (
     solve,
     with_input_rate,
 )
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import LinearMPC, MultipleShooting, Riccati
 from tests.linear.problems import general
 

@@ -21,7 +21,7 @@ from ocp import (
     terminal_set,
     with_terminal_set,
 )
-from ocp.internal import stationary
+from ocp.linear.stationary import stationary
 from solvers import LinearMPC
 
 DT, FORCE, BOUND = 0.05, 6.0, 2.0

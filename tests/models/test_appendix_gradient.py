@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from models import Disc, DistanceCost, PlanarArm, line, redundancy_ocp
 from ocp import OCP
-from ocp.internal import hamiltonian
+from ocp.minimum_principle.hamiltonian import hamiltonian
 
 LENGTHS = (1.0, 0.8, 0.7, 0.5)
 CENTER, RADIUS, INFLUENCE, GAIN, WEIGHT = np.array([0.9, 1.1]), 0.2, 2.5, 3.0, 0.7

@@ -7,7 +7,9 @@ import pytest
 from benchmarks.cases import arm_scenario
 from models.textbook import van_der_pol
 from ocp import OCP, RK4, Euler, Integrator, Midpoint
-from ocp.internal import Stage, c_code, differentiable_step
+from ocp.codegen.compile import c_code
+from ocp.integration.differentiable_step import differentiable_step
+from ocp.integration.one_step import Stage
 from tests.linear_dp.problems import unstable_mass
 from tests.ocp.differences import jacobian
 from tests.solvers.problems import changed, quartic, timed_transfer, tracker

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ocp import RK4, Compiler, InterpretedWarning, ProblemError
-from ocp.internal import BufferedFunction, Stage, c_code, compiled
+from ocp.codegen.buffered_function import BufferedFunction
+from ocp.codegen.compile import c_code, compiled
+from ocp.integration.one_step import Stage
 from tests.mpc.problems import cart
 
 # Machine code may contract a multiplication and an addition to one rounding.

@@ -9,7 +9,8 @@ import pytest
 from benchmarks.cases import arm_scenario
 from models.textbook import van_der_pol
 from ocp import OCP, RK4, Euler, Integrator, Midpoint
-from ocp.internal import Stage, stage_hessian
+from ocp.integration.one_step import Stage
+from ocp.integration.stage_hessian import stage_hessian
 from tests.linear_dp.problems import unstable_mass
 from tests.solvers.problems import quartic, tracker
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ocp import Box, ProblemError
-from ocp.internal import check_instance, check_not_negative, check_positive, check_whole
+from ocp.checks.arguments import check_instance, check_not_negative, check_positive, check_whole
 
 NO_NUMBERS = ["1", None, True, np.nan, 1j, [1.0], np.ones(1), np.bool_(True), float]
 

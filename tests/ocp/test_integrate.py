@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ocp import RK4, Euler, Integrator, Midpoint, ProblemError
-from ocp.internal import Stage
+from ocp.integration.one_step import Stage
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, lag, pendulum
 from tests.tolerances import DERIVATIVE, ORDER, ROUNDING

@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from ocp import OCP, Box, Model, Solution, Status, costates_along, evaluate, minimum_principle
-from ocp.internal import hamiltonian
+from ocp.minimum_principle.hamiltonian import hamiltonian
 from tests.ocp.differences import jacobian
 from tests.tolerances import DERIVATIVE, RESIDUAL
 

@@ -15,7 +15,7 @@ from ocp import (
     UnsupportedProblem,
     minimum_principle,
 )
-from ocp.internal import hamiltonian
+from ocp.minimum_principle.hamiltonian import hamiltonian
 from tests.ocp.differences import gradient, jacobian
 from tests.ocp.problems import energy, integrator, lag, pendulum
 from tests.tolerances import DERIVATIVE, MINIMISER, ROUNDING

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from ocp import Parameter, ProblemError, Signal
-from ocp.internal import ParameterValues
+from ocp.problem.parameters import ParameterValues
 from tests.ocp.problems import integrator, lag
 from tests.tolerances import ROUNDING
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ocp import Box, ProblemError, Solution, costates_along, evaluate
-from ocp.internal import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, pendulum, trajectory

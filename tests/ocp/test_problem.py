@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ocp import OCP, Box, Constraint, FreeTime, Guess, Parameter, ProblemError, Signal
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import MultipleShooting
 from tests.ocp.problems import DURATION, integrator, lag, pendulum
 

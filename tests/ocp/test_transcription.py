@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ocp import OCP, RK4, Box, Constraint, FreeTime
-from ocp.internal import RunData, Stage, Transcription
+from ocp.integration.one_step import Stage
+from ocp.nlp.transcription import Transcription
+from ocp.problem.run_data import RunData
 from solvers import MultipleShooting
 from tests.ocp.differences import gradient
 from tests.ocp.problems import energy, integrator, lag, pendulum

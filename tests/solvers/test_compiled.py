@@ -20,7 +20,7 @@ from ocp import (
     Solution,
     Status,
 )
-from ocp.internal import Transcription
+from ocp.nlp.transcription import Transcription
 from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 from tests.mpc.problems import cart
 from tests.solvers.problems import mass, tracker

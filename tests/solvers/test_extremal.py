@@ -6,7 +6,7 @@ import pytest
 from benchmarks.cases import arm_scenario
 from models.textbook import van_der_pol
 from ocp import OCP, RK4
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers.indirect.boundary_value_problem import ExtremalProblem
 from solvers.indirect.shooting_segments import ShootingSchedule
 from tests.ocp.differences import jacobian

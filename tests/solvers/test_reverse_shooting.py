@@ -20,12 +20,13 @@ from ocp import (
     evaluate,
     solve,
 )
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import MultipleShooting, ReverseShooting, polish
+from solvers.indirect.reverse.invariant_manifold import InvariantManifold
 from solvers.indirect.reverse.reverse_flow import ReverseFlow
 from solvers.indirect.reverse.reverse_shooting import Boundary
+from solvers.indirect.reverse.self_motion import seeds_around, self_motions
 from solvers.indirect.shooting_segments import ShootingSchedule
-from solvers.internal import InvariantManifold, seeds_around, self_motions
 from tests.solvers.problems import changed, point
 from tests.tolerances import DERIVATIVE, ROUNDING, STATIONARY, STEP
 

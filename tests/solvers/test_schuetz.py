@@ -28,7 +28,7 @@ from ocp import (
     evaluate,
     solve,
 )
-from ocp.internal import RunData
+from ocp.problem.run_data import RunData
 from solvers import Armijo, FixedStep, MultipleShooting, Schuetz
 from tests.ocp.differences import gradient
 from tests.solvers.problems import OTHER, changed, circle_start, point, timed_transfer, tracker

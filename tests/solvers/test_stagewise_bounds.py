@@ -11,7 +11,8 @@ from benchmarks.mpc import cart_pole_loop
 from models import cart_pole_upright
 from models.textbook import pendulum_swing_up
 from ocp import OCP, RK4, Box, Compiler, Guess, Model, Solution, Status, evaluate, solve
-from ocp.internal import RunData, Transcription
+from ocp.nlp.transcription import Transcription
+from ocp.problem.run_data import RunData
 from solvers import LinearMPC, MultipleShooting, StagewiseNewton
 from solvers.direct.newton.active_bounds import ActiveBounds
 from solvers.direct.newton.newton_step import Iterate, Linearisation, NewtonDirection, NewtonStep

@@ -25,7 +25,8 @@ from ocp import (
     UnsupportedProblem,
     solve,
 )
-from ocp.internal import RunData, Transcription
+from ocp.nlp.transcription import Transcription
+from ocp.problem.run_data import RunData
 from solvers import MultipleShooting, StagewiseNewton
 from solvers.direct.newton.newton_step import Iterate, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.cases import all_cases
 from models.textbook import van_der_pol
 from ocp import OCP, Box, Constraint, Model, ProblemError, Solver, Status, evaluate, solve
-from ocp.internal import scaled, sizes_of
+from ocp.problem.scaled import scaled, sizes_of
 from solvers import (
     Collocation,
     IndirectShooting,

@@ -18,7 +18,7 @@ from benchmarks.peers.tape import tape_of
 from models import cart_pole_swing_up
 from models.textbook import double_integrator_minimum_time
 from ocp import OCP, RK4, Box, Constraint, ProblemError
-from ocp.internal import Stage
+from ocp.integration.one_step import Stage
 
 SCRIPTS = Path(benchmarks.peers.__file__).parent / "scripts"
 
