@@ -7,11 +7,14 @@ from ocp.referee.refinement import ROUNDING, end_moved, is_resolved, refined
 from ocp.referee.segments import is_amplified
 from ocp.solution.solution import Solution
 
-# CVODES integrates with two tolerances: this multiple of the difference bounds the error.
-_TOLERANCES = (1e-8, 1e-9)
-_SAFETY = 2.0
+# CVODES integrates with these tolerances; a multiple of the last difference and a part of the
+# largest one bound the error, which falls by less than the tolerance does.
+_TOLERANCES = (1e-7, 1e-8, 1e-9)
+_OF_LAST, _OF_LARGEST = 2.0, 0.25
 # And is looked at this often over the horizon, at least.
 _FEWEST_SAMPLES = 400
+# A finite trajectory of more intervals is left to explicit steps: CVODES begins anew in each.
+_MANY_INTERVALS = 2000
 
 
 def integrate_controls(solution: Solution, *, tolerance: float = 1e-9) -> ReferenceTrajectory:
@@ -44,21 +47,24 @@ def _best(replayed: Replayed, tolerance: float) -> ReferenceTrajectory:
     if replayed.solution.problem.model.is_discrete:
         return replayed.explicitly(1)
     explicit = refined(replayed.explicitly, replayed.intervals, tolerance)
-    if is_resolved(explicit):
+    if is_resolved(explicit) or (explicit.is_finite and replayed.intervals > _MANY_INTERVALS):
         return explicit
     implicit = _implicit(replayed)
-    return implicit if implicit.cost_error < explicit.cost_error else explicit
+    apart = abs(implicit.cost - explicit.cost) if explicit.is_finite else 0.0
+    is_better = implicit.cost_error < explicit.cost_error
+    # Where they disagree, CVODES has stepped over something that is shorter than its steps.
+    return implicit if is_better and apart <= explicit.cost_error else explicit
 
 
 def _implicit(replayed: Replayed) -> ReferenceTrajectory:
-    """Integrate by CVODES with two tolerances; the error is inf where either fails."""
+    """Integrate by CVODES with all tolerances; the error is inf where it fails with any."""
     samples = 2 * max(1, -(-_FEWEST_SAMPLES // (2 * replayed.intervals)))
-    loose, tight = _TOLERANCES
-    coarse = replayed.implicitly(samples, loose)
-    if not coarse.is_finite:
-        return coarse
-    fine = replayed.implicitly(samples, tight)
-    if not fine.is_finite:
-        return fine
-    error = _SAFETY * abs(fine.cost - coarse.cost) + ROUNDING * fine.cost_size
-    return replace(fine, cost_error=error, end_error=end_moved(coarse, fine))
+    found: list[ReferenceTrajectory] = []
+    for tolerance in _TOLERANCES:
+        found.append(replayed.implicitly(samples, tolerance))
+        if not found[-1].is_finite:
+            return found[-1]
+    first, before, last = found
+    changes = _OF_LAST * abs(last.cost - before.cost), _OF_LARGEST * abs(last.cost - first.cost)
+    error = max(changes) + ROUNDING * last.cost_size
+    return replace(last, cost_error=error, end_error=end_moved(before, last))

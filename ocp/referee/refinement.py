@@ -16,16 +16,21 @@ _SUBSTEPS = (*_SUBSTEPS, 12982, 20782, 33262)
 _FEWEST_STEPS = 150
 # Refinement stops at this many steps, or at this many an interval where that is more.
 _MOST_STEPS = 2**15
-_MOST_SUBSTEPS_OF_MANY = 10
-# Grids that a verdict needs.
+_MOST_SUBSTEPS_OF_MANY = 22
+# Grids that a verdict needs, and that are compared where the last one has not settled.
 _GRIDS = 3
+_MORE_GRIDS = 5
+# Refinement converges as that of a smooth trajectory if each change is this part of the one before;
+# then this multiple of the last change bounds the error.
+_SMOOTH = 1.0 / 3.0
+_OF_CHANGE = 1.5
 # The end of a trajectory may move by this many times the tolerance of the cost.
 _END = 1e3
 # Rounding of a sum, relative to the sum of magnitudes.
 ROUNDING = 4.0 * float(np.finfo(float).eps)
 # What is left at the last grid and still counts as resolved, cost and end, relative.
-_COST_RESOLVED = 1e-4
-_END_RESOLVED = 1e-3
+_COST_RESOLVED = 1e-3
+_END_RESOLVED = 1e-2
 
 
 def refined(
@@ -45,12 +50,12 @@ def refined(
     """
     tried: list[ReferenceTrajectory] = []
     for substeps in _ladder(intervals):
-        tried = [*tried[1 - _GRIDS :], integrate(substeps)]
-        truth = _with_errors(tried)
+        tried = [*tried[1 - _MORE_GRIDS :], integrate(substeps)]
+        truth = _with_errors(tried[-_GRIDS:])
         is_settled = truth.cost_error <= tolerance * truth.cost_size
         if is_settled and truth.end_error <= _END * tolerance:
             return truth
-    return replace(truth, escape=_escape(tried))
+    return replace(_with_errors(tried), escape=_escape(tried))
 
 
 def is_resolved(truth: ReferenceTrajectory) -> bool:
@@ -69,15 +74,20 @@ def end_moved(before: ReferenceTrajectory, after: ReferenceTrajectory) -> float:
 def _with_errors(tried: list[ReferenceTrajectory]) -> ReferenceTrajectory:
     """Return the last trajectory with errors that explain its distance from those before it.
 
-    The error of the cost is assumed to fall at least in proportion to the steps; and it is at
-    least rounding.
+    Where the changes do not fall as those of a smooth trajectory do, for instance since it has
+    corners between the steps, they may be small by chance: then the largest distance counts.
     """
-    *others, last = tried
-    if len(tried) < _GRIDS or not all(each.is_finite for each in tried):
-        return last
-    errors = [abs(last.cost - each.cost) / (last.substeps / each.substeps - 1) for each in others]
+    finite = [each for each in tried if each.is_finite]
+    if len(tried) < _GRIDS or not all(each.is_finite for each in tried[-_GRIDS:]):
+        return tried[-1]
+    *others, last = finite
+    costs = np.array([each.cost for each in (*others, last)])
+    changes = np.abs(np.diff(costs))
+    is_smooth = bool(np.all(changes[1:] <= _SMOOTH * changes[:-1]))
+    error = _OF_CHANGE * changes[-1] if is_smooth else 2.0 * np.abs(costs - costs[-1]).max()
     rounding = ROUNDING * np.sqrt(len(last.t)) * last.cost_size
-    return replace(last, cost_error=max(errors) + rounding, end_error=end_moved(others[-1], last))
+    moved = end_moved(others[-1], last)
+    return replace(last, cost_error=float(error + rounding), end_error=moved)
 
 
 def _ladder(intervals: int) -> Iterator[int]:
