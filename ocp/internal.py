@@ -16,6 +16,9 @@ from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
+from ocp.method.judged import judged
+from ocp.method.method_program import MethodProgram, RunResult
+from ocp.method.method_solver import ACCURACY, MethodSolver
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.program_rows import most_violated
@@ -24,10 +27,10 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
-from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
+    "ACCURACY",
     "BufferedFunction",
     "ConstraintRow",
     "ConstraintRows",
@@ -35,6 +38,7 @@ __all__ = [
     "LinearQuadratic",
     "Matrices",
     "MethodProgram",
+    "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
     "RunData",
@@ -56,6 +60,7 @@ __all__ = [
     "elevated",
     "hamiltonian",
     "interpolate",
+    "judged",
     "most_violated",
     "stage_hessian",
     "start_violation",

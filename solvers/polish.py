@@ -3,7 +3,7 @@
 from time import perf_counter
 
 from ocp import Solution, Status, UnsupportedProblem, Work
-from ocp.internal import check_instance, check_positive
+from ocp.internal import ACCURACY, check_instance, check_positive, judged
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.step_halving import change_when_halved, finer
@@ -53,7 +53,7 @@ def polish(
             f"{ocp.name}: the cost has kinks (smoothness 0), no polish applies"
         )
     started = perf_counter()
-    program = solver.build(ocp)
+    program = solver.unjudged().build(ocp)
     built = perf_counter()
     result = _newton(program, solution)
     if not result.status.is_success:
@@ -63,7 +63,8 @@ def polish(
         verdict = program.second_order(result)
         status = Status.SOLVED if verdict.passed else Status.STATIONARY
         result = result.with_(status=status, message=verdict.reason)
-    return result.with_(build_time=built - started, solve_time=perf_counter() - built)
+    result = result.with_(build_time=built - started, solve_time=perf_counter() - built)
+    return judged(result, ACCURACY)
 
 
 def _refined(
@@ -97,7 +98,8 @@ def _newton(program: IndirectShootingProgram, guess: Solution) -> Solution:
 def _on_finer_grid(solution: Solution) -> Solution:
     """Return the direct solution on another grid, finer if it may be, or the same one."""
     intervals = min(_FINER * (len(solution.t) - 1), _MOST_INTERVALS)
-    data, program = solution.data, MultipleShooting(intervals).build(solution.problem)
+    coarse = MultipleShooting(intervals, judged=False)
+    data, program = solution.data, coarse.build(solution.problem)
     finer_grid = program.run(x0=data.x0, t0=data.t0, parameters=solution.parameters, guess=solution)
     return finer_grid if finer_grid.status.is_success else solution
 

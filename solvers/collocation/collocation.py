@@ -5,9 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, Solver, UnsupportedProblem
+from ocp import OCP, InitialGuess, UnsupportedProblem
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -25,7 +26,7 @@ from solvers.direct.nlp_run import NlpOutcome, NlpRun
 
 
 @dataclass(frozen=True)
-class Collocation(Solver):
+class Collocation(MethodSolver):
     r"""States and controls are polynomials on each interval; the dynamics hold at its points.
 
     With d points an interval states have degree d and controls d - 1, continuous states and
@@ -93,10 +94,15 @@ class Collocation(Solver):
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Collocation":
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, time_limit=limit)
+        return replace(self, time_limit=limit, judged=False)
 
     def build(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ocp import Solution, Status, Work
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import ACCURACY, check_instance, check_positive, check_whole, judged
 from solvers.collocation.collocation import Collocation
 from solvers.collocation.collocation_points import HIGHEST, LOWEST
 from solvers.collocation.mesh import Mesh
@@ -118,7 +118,8 @@ def refine_mesh(
         reason = f"an interval is still wrong by {last.error:.2g} after {len(done)} meshes"
         solution = solution.with_(status=Status.INACCURATE, message=reason)
     totals = {"work": work, "iterations": iterations, "solve_time": solve_time}
-    return MeshRefinement(solution.with_(build_time=made, **totals), tuple(done))
+    solution = judged(solution.with_(build_time=made, **totals), ACCURACY)
+    return MeshRefinement(solution, tuple(done))
 
 
 @dataclass(frozen=True)

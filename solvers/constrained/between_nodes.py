@@ -22,7 +22,7 @@ from ocp import (
     UnsupportedProblem,
     evaluate,
 )
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import check_instance, check_positive, check_whole, judged
 from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
@@ -80,7 +80,7 @@ class BetweenNodes(Solver):
             )
         rows = StandardForm.along(ocp)
         tightened = _tightened(ocp, rows, self.inner.intervals)
-        return BetweenNodesProgram(self, ocp, rows, self.inner.build(tightened))
+        return BetweenNodesProgram(self, ocp, rows, self.inner.unjudged().build(tightened))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,8 @@ class BetweenNodesProgram(Program):
             margin = margin + np.where(excess > 0.0, excess + tolerance / 2, 0.0)
             guess = inner
         status, message = self._verdict(runs, verdict.violation, verdict.worst, margin)
-        return self._solution(runs, status, message, perf_counter() - started)
+        found = self._solution(runs, status, message, perf_counter() - started)
+        return judged(found, self.solver.inner.success_accuracy, between_nodes=False)
 
     def _verdict(
         self, runs: list[Solution], violation: float, worst: str, margin: np.ndarray

@@ -6,9 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver
+from ocp import OCP, RK4, InitialGuess, Integrator
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     Transcription,
@@ -22,7 +23,7 @@ from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
-class MultipleShooting(Solver):
+class MultipleShooting(MethodSolver):
     """The direct baseline, for every kind of problem that can be described.
 
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
@@ -78,10 +79,15 @@ class MultipleShooting(Solver):
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "MultipleShooting":
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, compiled=compiled or self.compiled, time_limit=limit)
+        return replace(self, compiled=compiled or self.compiled, time_limit=limit, judged=False)
 
     def build(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

@@ -12,13 +12,13 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -31,7 +31,7 @@ from solvers.gradient.line_search import AcceptedStep, Armijo, FixedStep, StepRu
 
 
 @dataclass(frozen=True)
-class Schuetz(Solver):
+class Schuetz(MethodSolver):
     """Minimise over the control trajectory by (conjugate) gradients of the Hamiltonian.
 
     The defaults are Algorithm 2 as the thesis has it: Euler steps, a fixed step, Fletcher-
@@ -94,7 +94,7 @@ class Schuetz(Solver):
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Schuetz":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def build(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""

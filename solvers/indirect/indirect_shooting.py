@@ -12,12 +12,12 @@ from ocp import (
     Integrator,
     ProblemError,
     Solution,
-    Solver,
     UnsupportedProblem,
     Work,
 )
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -36,7 +36,7 @@ from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSche
 
 
 @dataclass(frozen=True)
-class IndirectShooting(Solver):
+class IndirectShooting(MethodSolver):
     """Shooting on the costates; exact to the integrator's error, if Newton gets there.
 
     One segment is the thesis' method: Newton-Raphson on psi(t0) (3.49, 3.50). More segments
@@ -87,7 +87,7 @@ class IndirectShooting(Solver):
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "IndirectShooting":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def build(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""

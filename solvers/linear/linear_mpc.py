@@ -5,12 +5,13 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, ProblemError, Solver, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, ProblemError, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,
     Matrices,
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_positive,
@@ -27,7 +28,7 @@ _UNAVOIDABLE = 1e-7
 
 
 @dataclass(frozen=True)
-class LinearMPC(Solver):
+class LinearMPC(MethodSolver):
     r"""A convex linear-quadratic problem with linear constraints, as a quadratic program.
 
     .. math:: \min_z \; \frac12 z'Hz + g'z \quad \text{s.t.} \quad l \le Gz \le u

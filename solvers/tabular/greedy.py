@@ -6,9 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, Work
+from ocp import OCP, RK4, InitialGuess, Integrator, Status, Work
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     Stage,
@@ -21,7 +22,7 @@ from solvers.tabular.refusal import refuse_free_ends
 
 
 @dataclass(frozen=True)
-class Greedy(Solver):
+class Greedy(MethodSolver):
     r"""One step ahead, for any problem with a fixed start and duration.
 
     .. math::

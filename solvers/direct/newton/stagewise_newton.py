@@ -4,9 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solver, Status, UnsupportedProblem, Work
+from ocp import OCP, RK4, InitialGuess, Integrator, Status, UnsupportedProblem, Work
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -19,7 +20,7 @@ from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
-class StagewiseNewton(Solver):
+class StagewiseNewton(MethodSolver):
     r"""Newton's method on the program of ``MultipleShooting``, solved by a Riccati recursion.
 
     The same transcription, hence the same optimal value: controls held on N intervals, one
@@ -70,9 +71,14 @@ class StagewiseNewton(Solver):
         for name in ("tolerance", "accuracy"):
             check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def build(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
