@@ -31,6 +31,9 @@ ROUNDING = 4.0 * float(np.finfo(float).eps)
 # What is left at the last grid and still counts as resolved, cost and end, relative.
 _COST_RESOLVED = 1e-3
 _END_RESOLVED = 1e-2
+# A state that leaves the finite numbers blows up if it was this many times its usual size before;
+# else a rate was no number.
+_BLOWN_UP = 1e6
 
 
 def refined(
@@ -101,11 +104,14 @@ def _escape(tried: list[ReferenceTrajectory]) -> float | None:
     """Return when the state leaves the finite numbers, if two grids agree on the instant."""
     if len(tried) < 2 or any(each.is_finite for each in tried[-2:]):
         return None
-    before, last = (_first_lost(each) for each in tried[-2:])
+    (before, _), (last, grown) = (_first_lost(each) for each in tried[-2:])
     slack = 1e-3 * (tried[-1].t[-1] - tried[-1].t[0]) + 3.0 * np.diff(tried[-2].t).max()
-    return last if abs(last - before) <= slack else None
+    return last if abs(last - before) <= slack and grown > _BLOWN_UP else None
 
 
-def _first_lost(truth: ReferenceTrajectory) -> float:
-    lost = ~np.isfinite(truth.x).all(axis=1)
-    return float(truth.t[int(lost.argmax())])
+def _first_lost(truth: ReferenceTrajectory) -> tuple[float, float]:
+    """Return the first instant that is not finite, and by what factor the state grew before."""
+    lost = int((~np.isfinite(truth.x).all(axis=1)).argmax())
+    size = np.abs(truth.x[:lost]).max(axis=1, initial=0.0)
+    grown = size[-1] / np.median(size) if lost and np.median(size) > 0.0 else 0.0
+    return float(truth.t[lost]), float(grown)
