@@ -16,6 +16,15 @@ from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
+from ocp.method.judged import judged
+from ocp.method.method_program import MethodProgram, RunResult
+from ocp.method.method_solver import ACCURACY, MethodSolver
+from ocp.method.scaled_program import (
+    ScaledProgram,
+    ScalingSolver,
+    in_original_units,
+    in_own_units,
+)
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
@@ -26,16 +35,10 @@ from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
-from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
-from ocp.solution.scaled_program import (
-    ScaledProgram,
-    ScalingSolver,
-    in_original_units,
-    in_own_units,
-)
 
 __all__ = [
+    "ACCURACY",
     "BufferedFunction",
     "ConstraintRow",
     "ConstraintRows",
@@ -43,6 +46,7 @@ __all__ = [
     "LinearQuadratic",
     "Matrices",
     "MethodProgram",
+    "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
     "RunData",
@@ -70,6 +74,7 @@ __all__ = [
     "in_original_units",
     "in_own_units",
     "interpolate",
+    "judged",
     "most_violated",
     "scaled",
     "sizes_of",

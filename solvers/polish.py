@@ -3,7 +3,15 @@
 from time import perf_counter
 
 from ocp import Solution, Status, UnsupportedProblem, Work
-from ocp.internal import check_instance, check_positive, in_original_units, in_own_units, scaled
+from ocp.internal import (
+    ACCURACY,
+    check_instance,
+    check_positive,
+    in_original_units,
+    in_own_units,
+    judged,
+    scaled,
+)
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.step_halving import change_when_halved, finer
@@ -56,7 +64,7 @@ def polish(
         polished = polish(in_own_units(solution, own), accuracy=accuracy, solver=solver)
         return in_original_units(polished, own)
     started = perf_counter()
-    program = solver.prepare(ocp)
+    program = solver.unjudged().prepare(ocp)
     built = perf_counter()
     result = _newton(program, solution)
     if not result.status.is_success:
@@ -66,7 +74,8 @@ def polish(
         verdict = program.second_order(result)
         status = Status.SOLVED if verdict.passed else Status.STATIONARY
         result = result.with_(status=status, message=verdict.reason)
-    return result.with_(build_time=built - started, solve_time=perf_counter() - built)
+    result = result.with_(build_time=built - started, solve_time=perf_counter() - built)
+    return judged(result, ACCURACY)
 
 
 def _refined(
@@ -100,7 +109,8 @@ def _newton(program: IndirectShootingProgram, guess: Solution) -> Solution:
 def _on_finer_grid(solution: Solution) -> Solution:
     """Return the direct solution on another grid, finer if it may be, or the same one."""
     intervals = min(_FINER * (len(solution.t) - 1), _MOST_INTERVALS)
-    data, program = solution.data, MultipleShooting(intervals).build(solution.problem)
+    coarse = MultipleShooting(intervals, judged=False)
+    data, program = solution.data, coarse.build(solution.problem)
     finer_grid = program.run(x0=data.x0, t0=data.t0, parameters=solution.parameters, guess=solution)
     return finer_grid if finer_grid.status.is_success else solution
 

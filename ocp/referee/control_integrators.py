@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import casadi as ca
@@ -40,19 +41,33 @@ class Steps(NamedTuple):
         return [self.t[:-1, None], np.diff(self.t)[:, None], self.p_start, self.p_end]
 
 
+class Restarts(NamedTuple):
+    """Where an integration by segments begins again, and from which states.
+
+    Attributes:
+        flags: 1 at the steps that begin a segment, else 0, (K, 1).
+        x: the states there; anything elsewhere, (K, nx).
+    """
+
+    flags: np.ndarray
+    x: np.ndarray
+
+
 class Integrated(NamedTuple):
     """What controls do on a grid of K steps.
 
     Attributes:
-        x: states (K + 1, nx).
-        running_cost: its integral.
+        x: states at the start of each step and at the end, (K + 1, nx).
+        ends: states after each step, (K, nx); ``x[1:]``, but where a segment begins.
+        costs: running cost of each step, (K,).
         u_start: control at the start of each step, (K, nu).
         u_end: control at the end of each step (its limit from the left), (K, nu).
         drive: what determines the control in each step, as the adjoint takes it.
     """
 
     x: np.ndarray
-    running_cost: float
+    ends: np.ndarray
+    costs: np.ndarray
     u_start: np.ndarray
     u_end: np.ndarray
     drive: tuple[np.ndarray, ...]
@@ -76,16 +91,50 @@ class ControlIntegrator(ABC):
         """Build the steps of a problem."""
 
     @abstractmethod
-    def integrate(self, solution: Solution, steps: Steps, start: np.ndarray) -> Integrated:
-        """Apply the controls of a solution from a start (nx,)."""
+    def integrate(
+        self, solution: Solution, steps: Steps, start: np.ndarray, restarts: Restarts | None = None
+    ) -> Integrated:
+        """Apply the controls of a solution from a start (nx,), or from that of each segment."""
+
+    def _march(
+        self, start: list[np.ndarray], inputs: list[np.ndarray], restarts: Restarts | None
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return states (K + 1, nx), see ``Integrated``, and all outputs of the steps."""
+        if restarts is None:
+            outputs = self.step(start, inputs)
+            return np.vstack([start[0], outputs[0]]), outputs
+        outputs = self._restarting(start, [*restarts, *inputs])
+        x = np.vstack([start[0], outputs[0]])
+        x[:-1] = np.where(restarts.flags > 0.5, restarts.x, x[:-1])
+        return x, outputs
+
+    @cached_property
+    def _restarting(self) -> ChunkedRollout:
+        """The steps, from a given state wherever a flag says so."""
+        step = self.step.step
+        inputs = [ca.MX.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
+        carried, others = inputs[: self.step.carried], inputs[self.step.carried :]
+        flag, given = ca.MX.sym("flag"), ca.MX.sym("given", carried[0].numel())
+        begin = ca.if_else(flag > 0.5, given, carried[0])
+        outputs = step.call([begin, *carried[1:], *others])
+        function = ca.Function("restarting", [*carried, flag, given, *others], outputs)
+        return ChunkedRollout(function, self.step.carried)
 
 
 class _KnownControls(ControlIntegrator):
     """Controls that are given functions of time."""
 
-    def _along(self, steps: Steps, start: np.ndarray, drive: tuple[np.ndarray, ...]) -> Integrated:
-        x, costs = self.step([start], [*drive, *steps.columns])
-        return Integrated(np.vstack([start, x]), float(costs.sum()), drive[0], drive[-1], drive)
+    def integrate(
+        self, solution: Solution, steps: Steps, start: np.ndarray, restarts: Restarts | None = None
+    ) -> Integrated:
+        """Apply them."""
+        drive = self._drive(solution, steps)
+        x, (ends, costs) = self._march([start], [*drive, *steps.columns], restarts)
+        return Integrated(x, ends, costs.ravel(), drive[0], drive[-1], drive)
+
+    @abstractmethod
+    def _drive(self, solution: Solution, steps: Steps) -> tuple[np.ndarray, ...]:
+        """Return the controls at both ends of each step, and what lies between, (K, nu) each."""
 
 
 class HeldControls(_KnownControls):
@@ -97,22 +146,22 @@ class HeldControls(_KnownControls):
         stage = Stage.of(ocp, RK4(), held=False)
         return cls(ChunkedRollout(stage.step), ChunkedRollout(stage.adjoint))
 
-    def integrate(self, solution: Solution, steps: Steps, start: np.ndarray) -> Integrated:
+    def _drive(self, solution: Solution, steps: Steps) -> tuple[np.ndarray, ...]:
         """Hold them."""
         middle = (steps.fractions[1:] + steps.fractions[:-1]) / 2
         node = np.searchsorted(solution.fractions, middle) - 1
         u = solution.u[np.clip(node, 0, len(solution.u) - 1)]
-        return self._along(steps, start, (u, u))
+        return u, u
 
 
 class LinearControls(HeldControls):
     """Controls linear from node to node: the same steps."""
 
-    def integrate(self, solution: Solution, steps: Steps, start: np.ndarray) -> Integrated:
+    def _drive(self, solution: Solution, steps: Steps) -> tuple[np.ndarray, ...]:
         """Interpolate them."""
         nodes = solution.fractions
         u = np.stack([np.interp(steps.fractions, nodes, c) for c in solution.u.T], axis=1)
-        return self._along(steps, start, (u[:-1], u[1:]))
+        return u[:-1], u[1:]
 
 
 class PolynomialControls(_KnownControls):
@@ -124,13 +173,12 @@ class PolynomialControls(_KnownControls):
         stage = Stage.of(ocp, RK4(), held=False, curved=True)
         return cls(ChunkedRollout(stage.step), ChunkedRollout(stage.adjoint))
 
-    def integrate(self, solution: Solution, steps: Steps, start: np.ndarray) -> Integrated:
+    def _drive(self, solution: Solution, steps: Steps) -> tuple[np.ndarray, ...]:
         """Evaluate them."""
         t, pieces = solution.t[0] + steps.fractions * solution.duration, solution.pieces
         middle = (t[1:] + t[:-1]) / 2
         piece = pieces.of(middle)
-        u_start, u_middle, u_end = (pieces.at(at, piece) for at in (t[:-1], middle, t[1:]))
-        return self._along(steps, start, (u_start, u_middle, u_end))
+        return tuple(pieces.at(at, piece) for at in (t[:-1], middle, t[1:]))
 
 
 class ExtremalControls(ControlIntegrator):
@@ -184,14 +232,17 @@ class ExtremalControls(ControlIntegrator):
         )
         return cls(ChunkedRollout(step, carried=2), ChunkedRollout(adjoint_step))
 
-    def integrate(self, solution: Solution, steps: Steps, start: np.ndarray) -> Integrated:
+    def integrate(
+        self, solution: Solution, steps: Steps, start: np.ndarray, restarts: Restarts | None = None
+    ) -> Integrated:
         """Run states and costates beside the plant."""
         node = np.searchsorted(solution.fractions, steps.fractions[:-1] + 1e-12, side="right") - 1
         restart = np.append(True, np.diff(node) > 0).astype(float)[:, None]
         z_node = np.hstack([solution.x, solution.costate])[node]
         inputs = [restart, z_node, *steps.columns]
-        x, _, costs, inner, u_start, u_end = self.step([start, z_node[0]], inputs)
-        return Integrated(np.vstack([start, x]), float(costs.sum()), u_start, u_end, (inner,))
+        x, outputs = self._march([start, z_node[0]], inputs, restarts)
+        ends, _, costs, inner, u_start, u_end = outputs
+        return Integrated(x, ends, costs.ravel(), u_start, u_end, (inner,))
 
 
 def integrator_of(solution: Solution) -> ControlIntegrator:

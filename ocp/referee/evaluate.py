@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
-from ocp.referee.reference_trajectory import ReferenceTrajectory, adjoint, integrate_controls
+from ocp.referee.integrate_controls import integrate_controls
+from ocp.referee.memory import remembered
+from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
+from ocp.referee.segments import defects, gaps, growth, worth
 from ocp.referee.stationarity import final_costate, stationarity
 from ocp.referee.violation import invariant_drift, largest_violation
 from ocp.solution.solution import Solution
@@ -16,17 +19,27 @@ class Evaluation:
     """The verdict on a solution.
 
     Attributes:
-        cost: true cost, inf if the controls make the state blow up.
-        cost_error: change of the cost under the last halving of the steps.
+        cost: true cost, inf if the controls make the state blow up, or no method resolves it.
+        cost_error: bound of the error of the cost: from integrations of other accuracy and, by
+            segments, what the gaps are worth by the solution's costates; inf where not known.
         violation: largest violation of any bound or constraint, between the nodes too.
         worst: which one, and when; empty where nothing is violated.
         stationarity: residual of the minimum principle, max over time of
             abs(u - clip(u - H_u)) with the referee's own costates, for a held control
             averaged over its interval, for a polynomial one by its coefficients, and of
             transversality at free ends; None where a path constraint or state bound is active
-            (its multiplier would be needed).
+            (its multiplier would be needed), and for stiff or unstable dynamics, along which
+            explicit steps of the adjoint would not stay finite.
         task_drift: largest violation of the problem's invariants.
         defect: largest distance of the solution's states from the true ones at its nodes.
+        replay: ``"open loop"``: the controls are applied from the start to the end; or
+            ``"by segments"``: from each node of the solution to the next, since the dynamics
+            amplify the solution's tiny errors until open loop means nothing.
+        gap: by segments, by how much their ends miss the next node at most; None in open loop.
+        growth: by segments, the factor by which errors grow in open loop, relative to the size
+            of each state; None in open loop.
+        resolution: the largest distance of instants at which states, rows and costs are looked at
+            [s]; anything shorter may be missed.
         truth: the trajectory itself.
     """
 
@@ -37,15 +50,21 @@ class Evaluation:
     stationarity: float | None
     task_drift: float
     defect: float
+    replay: Replay
+    gap: float | None
+    growth: float | None
+    resolution: float
     truth: ReferenceTrajectory
 
 
 def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
     """Judge a solution by integrating its controls, whatever its solver says.
 
+    The latest verdicts are kept with the problem: the second call costs nothing.
+
     Args:
         solution: of any solver, with controls of any kind.
-        tolerance: the cost is refined until halving the steps changes it by less, relative.
+        tolerance: accepted error of the cost, relative to its size, see ``integrate_controls``.
 
     Returns:
         the verdict; nothing is raised for a bad trajectory, its numbers are bad.
@@ -55,28 +74,48 @@ def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
     """
     check_instance(solution, Solution, "evaluate: solution")
     check_positive(tolerance, "evaluate: tolerance")
+    return _evaluation(solution, tolerance)
+
+
+@remembered
+def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
     truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
-        return Evaluation(
-            cost=np.inf,
-            cost_error=np.inf,
-            violation=np.inf,
-            worst="the state blows up",
-            stationarity=None,
-            task_drift=np.inf,
-            defect=np.inf,
-            truth=truth,
-        )
+        return _lost(truth)
     violation = largest_violation(solution, truth)
-    own = np.stack([np.interp(solution.t, truth.t, c) for c in truth.x.T], axis=1)
+    in_open_loop = truth.replay == "open loop"
+    gap = None if in_open_loop else float(gaps(solution, truth).max())
     return Evaluation(
         cost=truth.cost,
-        cost_error=truth.cost_error,
+        cost_error=truth.cost_error + (0.0 if in_open_loop else worth(solution, truth)),
         violation=violation.amount,
         worst=violation.where if violation.amount > 0.0 else "",
         stationarity=stationarity(solution, truth),
         task_drift=invariant_drift(solution, truth),
-        defect=float(np.abs(own - solution.x).max()),
+        defect=float(defects(solution, truth).max()) if gap is None else gap,
+        replay=truth.replay,
+        gap=gap,
+        growth=None if in_open_loop else growth(solution, truth),
+        resolution=truth.resolution,
+        truth=truth,
+    )
+
+
+def _lost(truth: ReferenceTrajectory) -> Evaluation:
+    """The verdict on a trajectory that is not finite."""
+    unresolved = f"not resolved in {len(truth.t) - 1} steps"
+    return Evaluation(
+        cost=np.inf,
+        cost_error=np.inf,
+        violation=np.inf,
+        worst=unresolved if truth.escape is None else "the state blows up",
+        stationarity=None,
+        task_drift=np.inf,
+        defect=np.inf,
+        replay=truth.replay,
+        gap=None,
+        growth=None,
+        resolution=truth.resolution,
         truth=truth,
     )
 
@@ -89,11 +128,12 @@ def costates_along(solution: Solution) -> Solution:
     the terminal cost plus the part of the given costate that is normal to them.
 
     Args:
-        solution: of any method; returned as it is where its controls make the state blow up.
+        solution: of any method; returned as it is where its controls make the state blow up, or
+            where the dynamics are too stiff or too unstable for explicit steps in open loop.
     """
     check_instance(solution, Solution, "costates_along: solution")
     truth = integrate_controls(solution)
-    if not truth.is_finite:
+    if not truth.has_adjoint:
         return solution
     costates, _ = adjoint(solution, truth, final_costate(solution, truth)[0])
     rows = [np.interp(solution.t, truth.t, c) for c in costates.T]

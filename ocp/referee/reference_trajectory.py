@@ -1,16 +1,15 @@
-"""What a solution's controls really do: the plant integrated until the cost holds still."""
+"""What a solution's controls really do: the trajectory, and one integration of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from ocp.referee.control_integrators import Steps, integrator_of
+from ocp.referee.control_integrators import Restarts, Steps, integrator_of
+from ocp.referee.implicit_integrator import integrate_implicitly
 from ocp.solution.solution import Solution
 
-# Refinement stops at this many integration steps whatever the error still is.
-_MOST_STEPS = 2**15
-_FEWEST_STEPS = 400
-_FEWEST_PER_INTERVAL = 4
+Replay = Literal["open loop", "by segments"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,63 +18,142 @@ class ReferenceTrajectory:
 
     Attributes:
         t: (K + 1,) [s].
-        x: (K + 1, nx).
+        x: at the start of every step and at the end, (K + 1, nx).
+        ends: at the end of every step, (K, nx): ``x[1:]``, but for the last step of a segment.
         u_start: control at the start of each step, (K, nu).
         u_end: control at the end of each step (its limit from the left), (K, nu).
         drive: what determines the control in each step, see ``Integrated``.
         p_start: parameters at the start of each step, (K, n_p).
         p_end: parameters at the end of each step, (K, n_p).
         cost: running plus terminal cost.
-        cost_error: by how much the last refinement changed the cost.
-        substeps: steps per interval of the solution.
+        cost_size: integral of abs(L) plus the magnitude of the terminal cost.
+        cost_error: bound of the error of the cost, from integrations of other accuracy; inf where
+            none was made.
+        end_error: by how much the last refinement moved the final state, relative.
+        substeps: steps in every interval between two knots.
+        replay: ``"open loop"``: from the start to the end; ``"by segments"``: from each node of
+            the solution to the next, for dynamics that amplify every rounding error.
+        method: ``"explicit"``: RK4 in equal steps; ``"implicit"``: CVODES.
+        escape: when the state leaves the finite numbers, if it surely does [s].
     """
 
     t: np.ndarray
     x: np.ndarray
+    ends: np.ndarray
     u_start: np.ndarray
     u_end: np.ndarray
     drive: tuple[np.ndarray, ...]
     p_start: np.ndarray
     p_end: np.ndarray
     cost: float
+    cost_size: float
     cost_error: float
     substeps: int
+    end_error: float = np.inf
+    replay: Replay = "open loop"
+    method: Literal["explicit", "implicit"] = "explicit"
+    escape: float | None = None
 
     @property
     def is_finite(self) -> bool:
         """Whether the integration stayed finite."""
         return bool(np.isfinite(self.cost) and np.isfinite(self.x).all())
 
+    @property
+    def has_adjoint(self) -> bool:
+        """Whether ``adjoint`` can be integrated: along explicit steps in open loop."""
+        return self.is_finite and self.method == "explicit" and self.replay == "open loop"
 
-def integrate_controls(solution: Solution, *, tolerance: float = 1e-9) -> ReferenceTrajectory:
-    """Integrate a solution's controls from its start, refining until cost and end hold still.
+    @property
+    def resolution(self) -> float:
+        """The largest distance of instants at which states, rows and costs are looked at [s]."""
+        return float(np.diff(self.t).max())
 
-    The steps are halved until the cost changes by less than ``tolerance`` (relative to
-    1 + cost) and the final state by less than a thousand times that: close to a singular
-    configuration it goes on moving long after the cost has settled.
 
-    Args:
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A solution whose controls are applied, in open loop or by segments.
+
+    Attributes:
         solution: controls of any kind; the start is the one that was asked for, or the
             solution's own where the problem leaves it free.
-        tolerance: accepted change of the cost under halving the steps.
-
-    Returns:
-        the finest trajectory; not finite if the integration blows up.
+        replay: whether every node of the solution begins a segment.
+        moved: displacement of every segment's start (nx,).
     """
-    if solution.problem.model.is_discrete:
-        return _integrated(solution, 1)
-    intervals = len(_knots(solution)) - 1
-    substeps = max(_FEWEST_PER_INTERVAL, -(-_FEWEST_STEPS // intervals))
-    truth = _integrated(solution, substeps)
-    while truth.is_finite and 2 * substeps * intervals <= _MOST_STEPS:
-        substeps *= 2
-        finer = _integrated(solution, substeps)
-        change = abs(finer.cost - truth.cost) / (1.0 + abs(finer.cost))
-        moved = np.abs(finer.x[-1] - truth.x[-1]).max() / (1.0 + np.abs(finer.x[-1]).max())
-        truth = replace(finer, cost_error=abs(finer.cost - truth.cost))
-        if change <= tolerance and moved <= 1e3 * tolerance:
-            break
-    return truth
+
+    solution: Solution
+    replay: Replay = "open loop"
+    moved: np.ndarray | float = 0.0
+
+    @property
+    def intervals(self) -> int:
+        """The number of intervals between two knots."""
+        return len(self.knots) - 1
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Fractions of the horizon between which controls and signals are smooth."""
+        solution = self.solution
+        if solution.problem.model.is_discrete:
+            return solution.fractions
+        values = solution.problem.parameter_values(solution.parameters)
+        knots = np.union1d(solution.fractions, values.knots)
+        return knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
+
+    @property
+    def node_knots(self) -> np.ndarray:
+        """Which knots are the solution's nodes, (N + 1,); nodes in one place have one knot."""
+        return np.searchsorted(self.knots, self.solution.fractions, side="right") - 1
+
+    def explicitly(self, substeps: int) -> ReferenceTrajectory:
+        """Integrate by RK4; its error is not known yet."""
+        return self._integrated(substeps, None)
+
+    def implicitly(self, substeps: int, tolerance: float) -> ReferenceTrajectory:
+        """Integrate by CVODES; its error is not known yet."""
+        return self._integrated(substeps, tolerance)
+
+    def _integrated(self, substeps: int, tolerance: float | None) -> ReferenceTrajectory:
+        solution, ocp, knots = self.solution, self.solution.problem, self.knots
+        inside = np.arange(substeps) / substeps
+        fine = np.append((knots[:-1, None] + inside * np.diff(knots)[:, None]).ravel(), 1.0)
+        t = solution.t[0] + fine * solution.duration
+        values = ocp.parameter_values(solution.parameters)
+        steps = Steps(fine, t, *values.on(fine))
+        start = (solution.x[0] if ocp.has_free_start else solution.x0) + self.moved
+        restarts = self._restarts(substeps, len(t) - 1)
+        if tolerance is None:
+            found = integrator_of(solution).integrate(solution, steps, start, restarts)
+        else:
+            given = (solution, steps, substeps, start, restarts, tolerance)
+            found = integrate_implicitly(*given)
+        terminal = float(ocp.functions.terminal_cost(found.x[-1], t[-1], values.at(1.0)[0]))
+        return ReferenceTrajectory(
+            t=t,
+            x=found.x,
+            ends=found.ends,
+            u_start=found.u_start,
+            u_end=found.u_end,
+            drive=found.drive,
+            p_start=steps.p_start,
+            p_end=steps.p_end,
+            cost=float(found.costs.sum()) + terminal,
+            cost_size=float(np.abs(found.costs).sum()) + abs(terminal),
+            cost_error=0.0 if ocp.model.is_discrete else np.inf,
+            substeps=substeps,
+            replay=self.replay,
+            method="explicit" if tolerance is None else "implicit",
+        )
+
+    def _restarts(self, substeps: int, count: int) -> Restarts | None:
+        if self.replay == "open loop":
+            return None
+        first, nodes = np.unique(self.node_knots[:-1], return_index=True)
+        flags, x = np.zeros((count, 1)), np.zeros((count, self.solution.x.shape[1]))
+        later = nodes > 0
+        at = first[later] * substeps
+        flags[at], x[at] = 1.0, self.solution.x[nodes[later]] + self.moved
+        return Restarts(flags, x)
 
 
 def adjoint(
@@ -86,42 +164,10 @@ def adjoint(
     Between those of the ends stands that of the middle, where the control is polynomial.
     The adjoint of the discretised trajectory itself, from ``final`` backwards: consistent
     to the order of the integrator, with no error of its own. For an extremal the gradients
-    are zero: its controls have no parameters.
+    are zero: its controls have no parameters. Only where the trajectory ``has_adjoint``.
     """
     steps = np.diff(truth.t)[:, None]
     inputs = [truth.x[:-1], *truth.drive, truth.t[:-1, None], steps, truth.p_start, truth.p_end]
     backwards = [array[::-1] for array in inputs]
     costate, *gradients = integrator_of(solution).adjoint([final], backwards)
     return np.vstack([costate[::-1], final]), tuple(g[::-1] for g in gradients)
-
-
-def _knots(solution: Solution) -> np.ndarray:
-    """Fractions of the horizon between which controls and signals are smooth."""
-    values = solution.problem.parameter_values(solution.parameters)
-    knots = np.union1d(solution.fractions, values.knots)
-    return knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
-
-
-def _integrated(solution: Solution, substeps: int) -> ReferenceTrajectory:
-    ocp = solution.problem
-    knots = solution.fractions if ocp.model.is_discrete else _knots(solution)
-    inside = np.arange(substeps) / substeps
-    fine = np.append((knots[:-1, None] + inside * np.diff(knots)[:, None]).ravel(), 1.0)
-    t = solution.t[0] + fine * solution.duration
-    values = ocp.parameter_values(solution.parameters)
-    steps = Steps(fine, t, *values.on(fine))
-    start = solution.x[0] if ocp.has_free_start else solution.x0
-    found = integrator_of(solution).integrate(solution, steps, start)
-    terminal = float(ocp.functions.terminal_cost(found.x[-1], t[-1], values.at(1.0)[0]))
-    return ReferenceTrajectory(
-        t=t,
-        x=found.x,
-        u_start=found.u_start,
-        u_end=found.u_end,
-        drive=found.drive,
-        p_start=steps.p_start,
-        p_end=steps.p_end,
-        cost=found.running_cost + terminal,
-        cost_error=0.0,
-        substeps=substeps,
-    )

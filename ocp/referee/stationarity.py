@@ -21,10 +21,10 @@ def stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None
     dJ/du of their values or coefficients, per second of their support), of the costate's
     distance from the normals of the start manifold, and of the natural residual of a free
     final time. None where a path constraint or a state bound is active: its multiplier would
-    be needed.
+    be needed; and where the trajectory has no adjoint, see ``ReferenceTrajectory``.
     """
     ocp = solution.problem
-    if _path_is_active(solution, truth):
+    if not truth.has_adjoint or _path_is_active(solution, truth):
         return None
     final, at_end = final_costate(solution, truth)
     costates, gradients = adjoint(solution, truth, final)

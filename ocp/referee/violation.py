@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ocp.problem.constraint_rows import Violation
+from ocp.problem.constraint_rows import ConstraintRows, Violation
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 from ocp.solution.solution import Solution
 
@@ -47,19 +47,36 @@ def path_values(
     yield at_end, truth.t[1:]
 
 
+def values_along(
+    solution: Solution, truth: ReferenceTrajectory
+) -> Iterator[tuple[ConstraintRows, np.ndarray, np.ndarray]]:
+    """Yield what holds at every instant: rows, their values (K, m), and the instants (K,)."""
+    rows = solution.problem.rows
+    yield rows.states, truth.x, truth.t
+    for values, instants in path_values(solution, truth):
+        yield rows.path, values, instants
+
+
+def values_at_ends(
+    solution: Solution, truth: ReferenceTrajectory
+) -> Iterator[tuple[ConstraintRows, np.ndarray, np.ndarray]]:
+    """Yield what holds at the start, and at the end: rows, their values (1, m), and when (1,)."""
+    functions, rows, p = solution.problem.functions, solution.problem.rows, solution.data.values
+    first = functions.initial(truth.x[0], truth.t[0], truth.p_start[0])
+    last = functions.terminal(truth.x[-1], truth.t[-1], p.at(1.0)[0])
+    yield rows.initial, np.array(first).T, truth.t[:1]
+    yield rows.terminal, np.array(last).T, truth.t[-1:]
+
+
 def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:
     """Yield the largest violation of each group of rows."""
     ocp, rows, t = solution.problem, solution.problem.rows, truth.t
-    yield rows.states.largest_violation(truth.x, t)
+    for group, values, instants in values_along(solution, truth):
+        yield group.largest_violation(values, instants)
     yield rows.controls.largest_violation(truth.u_start, t[:-1])
     yield rows.controls.largest_violation(truth.u_end, t[1:])
-    for values, instants in path_values(solution, truth):
-        yield rows.path.largest_violation(values, instants)
-    functions, p = ocp.functions, solution.data.values
-    first = functions.initial(truth.x[0], t[0], truth.p_start[0])
-    last = functions.terminal(truth.x[-1], t[-1], p.at(1.0)[0])
-    yield rows.initial.largest_violation(np.array(first).T, t[:1])
-    yield rows.terminal.largest_violation(np.array(last).T, t[-1:])
+    for group, values, instants in values_at_ends(solution, truth):
+        yield group.largest_violation(values, instants)
     yield Violation(
         float(ocp.time_box.excess(np.array([solution.duration]))[0]), rows.time, float(t[-1])
     )

@@ -83,6 +83,13 @@ class Solver(ABC):
         """
         return self
 
+    def unjudged(self) -> "Solver":
+        """Return the solver for a method that compares its answers with the referee by itself.
+
+        Here as it is; see ``MethodSolver``.
+        """
+        return self
+
 
 def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
     """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.

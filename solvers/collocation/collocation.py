@@ -94,10 +94,15 @@ class Collocation(ScalingSolver):
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Collocation":
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, time_limit=limit)
+        return replace(self, time_limit=limit, judged=False)
 
     def prepare(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.

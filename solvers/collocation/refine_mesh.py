@@ -8,11 +8,13 @@ import numpy as np
 
 from ocp import Solution, Status, Work
 from ocp.internal import (
+    ACCURACY,
     check_instance,
     check_positive,
     check_whole,
     in_original_units,
     in_own_units,
+    judged,
     scaled,
 )
 from solvers.collocation.collocation import Collocation
@@ -130,7 +132,8 @@ def refine_mesh(
         reason = f"an interval is still wrong by {last.error:.2g} after {len(done)} meshes"
         solution = solution.with_(status=Status.INACCURATE, message=reason)
     totals = {"work": work, "iterations": iterations, "solve_time": solve_time}
-    return MeshRefinement(solution.with_(build_time=made, **totals), tuple(done))
+    solution = judged(solution.with_(build_time=made, **totals), ACCURACY)
+    return MeshRefinement(solution, tuple(done))
 
 
 @dataclass(frozen=True)

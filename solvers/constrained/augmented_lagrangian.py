@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
-from ocp.internal import RunData, ScalingSolver, check_instance, check_positive, check_whole
+from ocp.internal import (
+    ACCURACY,
+    RunData,
+    ScalingSolver,
+    check_instance,
+    check_positive,
+    check_whole,
+    judged,
+)
 from solvers.constrained.multiplier_iteration import MultiplierIteration, MultiplierResult
 from solvers.constrained.multiplier_round import RelaxedProgram
 from solvers.constrained.multiplier_rule import MultiplierRule
@@ -108,7 +116,8 @@ class AugmentedLagrangian(ScalingSolver):
                 f"{ocp.name}: there is no path, state or terminal constraint to relax; use "
                 f"{type(self.inner).__name__} itself"
             )
-        return AugmentedLagrangianProgram(self, ocp, relaxed, self.inner.build(relaxed.ocp))
+        inner = self.inner.unjudged().build(relaxed.ocp)
+        return AugmentedLagrangianProgram(self, ocp, relaxed, inner)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +151,8 @@ class AugmentedLagrangianProgram(Program):
         rule = MultiplierRule(s.penalty, s.growth, s.largest_penalty, s.tolerance)
         verdict = MultiplierVerdict(program, rule, s.complementarity)
         result = MultiplierIteration(program, rule, verdict, s.max_iterations).run(data, guess)
-        return self._solution(result).with_(solve_time=perf_counter() - started)
+        found = self._solution(result).with_(solve_time=perf_counter() - started)
+        return judged(found, ACCURACY, between_nodes=False)
 
     def _solution(self, result: MultiplierResult) -> Solution:
         """Return the last round of a success, the least violating one of a failure."""

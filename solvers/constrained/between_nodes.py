@@ -21,7 +21,7 @@ from ocp import (
     UnsupportedProblem,
     evaluate,
 )
-from ocp.internal import ScalingSolver, check_instance, check_positive, check_whole
+from ocp.internal import ScalingSolver, check_instance, check_positive, check_whole, judged
 from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
@@ -79,7 +79,7 @@ class BetweenNodes(ScalingSolver):
             )
         rows = StandardForm.along(ocp)
         tightened = _tightened(ocp, rows, self.inner.intervals)
-        return BetweenNodesProgram(self, ocp, rows, self.inner.build(tightened))
+        return BetweenNodesProgram(self, ocp, rows, self.inner.unjudged().build(tightened))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,8 @@ class BetweenNodesProgram(Program):
             margin = margin + np.where(excess > 0.0, excess + tolerance / 2, 0.0)
             guess = inner
         status, message = self._verdict(runs, verdict.violation, verdict.worst, margin)
-        return self._solution(runs, status, message, perf_counter() - started)
+        found = self._solution(runs, status, message, perf_counter() - started)
+        return judged(found, self.solver.inner.success_accuracy, between_nodes=False)
 
     def _verdict(
         self, runs: list[Solution], violation: float, worst: str, margin: np.ndarray

@@ -15,7 +15,7 @@ from ocp import (
     Work,
     evaluate,
 )
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import ACCURACY, check_instance, check_positive, check_whole, judged
 
 
 def penalty_continuation(
@@ -68,7 +68,7 @@ def penalty_continuation(
         raise ProblemError(
             f"penalty continuation: '{parameter}' = {penalty}, it must be positive to be raised"
         )
-    program = solver.build(soft)
+    program = solver.unjudged().build(soft)
     runs: list[Solution] = []
     verdicts: list[Evaluation] = []
     while len(runs) < most:
@@ -78,7 +78,7 @@ def penalty_continuation(
         if not run.status.is_success or verdicts[-1].violation <= tolerance:
             break
         penalty = factor * penalty
-    return _summed(runs, verdicts, tolerance)
+    return judged(_summed(runs, verdicts, tolerance), ACCURACY)
 
 
 def _first_penalty(soft: OCP, parameter: str) -> np.ndarray:

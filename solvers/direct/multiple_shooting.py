@@ -79,10 +79,15 @@ class MultipleShooting(ScalingSolver):
             time_limit=np.inf if self.time_limit is None else self.time_limit,
         )
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "MultipleShooting":
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, compiled=compiled or self.compiled, time_limit=limit)
+        return replace(self, compiled=compiled or self.compiled, time_limit=limit, judged=False)
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

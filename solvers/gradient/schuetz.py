@@ -95,7 +95,7 @@ class Schuetz(ScalingSolver):
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Schuetz":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def build(self, ocp: OCP) -> Program:
         """Build it; a fixed step has units, and is taken in those of the problem as written."""

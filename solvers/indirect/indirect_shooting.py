@@ -78,7 +78,7 @@ class IndirectShooting(ScalingSolver):
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "IndirectShooting":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def prepare(self, ocp: OCP) -> "IndirectShootingProgram":
         """Derive the boundary value problem."""

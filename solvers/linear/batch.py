@@ -6,8 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from ocp import OCP, InitialGuess, Solver, Status, Work, linear_quadratic
-from ocp.internal import LinearQuadratic, LQData, Matrices, MethodProgram, RunData, RunResult
+from ocp import OCP, InitialGuess, Status, Work, linear_quadratic
+from ocp.internal import (
+    LinearQuadratic,
+    LQData,
+    Matrices,
+    MethodProgram,
+    MethodSolver,
+    RunData,
+    RunResult,
+)
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.stacked_prediction import StackedPrediction
 
@@ -16,7 +24,7 @@ _ILL_CONDITIONED = 1e8
 
 
 @dataclass(frozen=True)
-class Batch(Solver):
+class Batch(MethodSolver):
     r"""Stack all states over all inputs, and set the gradient of the cost to zero.
 
     .. math:: U^* = -H^{-1}(F'x_0 - k')

@@ -10,18 +10,17 @@ from ocp import (
     OCP,
     InitialGuess,
     ProblemError,
-    Solver,
     Status,
     Work,
     linear_quadratic,
     with_stationary_end,
 )
-from ocp.internal import LinearQuadratic, MethodProgram, RunData, RunResult
+from ocp.internal import LinearQuadratic, MethodProgram, MethodSolver, RunData, RunResult
 from solvers.linear import regulator_gains as recursion
 
 
 @dataclass(frozen=True)
-class Riccati(Solver):
+class Riccati(MethodSolver):
     r"""Riccati's recursion: feedback gains and costs-to-go of a linear-quadratic problem.
 
     .. math:: u_k = -K_kx_k - k_k, \qquad J_k^*(x) = x'P_kx + 2p_k'x + \text{const}, \qquad

@@ -13,13 +13,13 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -40,7 +40,7 @@ _PER_CORNER = 36
 
 
 @dataclass(frozen=True)
-class GridDP(Solver):
+class GridDP(MethodSolver):
     r"""Bellman's recursion 2.22 to 2.33 on a grid, for any problem with one to three states.
 
     Takes dynamics, costs and path constraints of any kind, state bounds, terminal constraints

@@ -160,7 +160,7 @@ def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
         plain, time_limit=10.0, compiled=True
     )
     shooting = IndirectShooting()
-    assert shooting.for_control_loop(compiled=False, time_limit=10.0) is shooting
+    assert shooting.for_control_loop(compiled=False, time_limit=10.0) == shooting
 
 
 def test_a_small_excess_is_clipped_and_recorded() -> None:

@@ -21,7 +21,7 @@ from ocp import (
     evaluate,
 )
 from ocp.referee.chunked_rollout import ChunkedRollout
-from ocp.referee.reference_trajectory import integrate_controls
+from ocp.referee.integrate_controls import integrate_controls
 from solvers import IndirectShooting, MultipleShooting
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, energy, integrator, lag, pendulum, trajectory

@@ -71,9 +71,14 @@ class StagewiseNewton(ScalingSolver):
         for name in ("tolerance", "accuracy"):
             check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=True) if compiled else self
+        return replace(self, compiled=compiled or self.compiled, judged=False)
 
     def prepare(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""

@@ -13,13 +13,13 @@ from ocp import (
     InitialGuess,
     Integrator,
     ProblemError,
-    Solver,
     Status,
     UnsupportedProblem,
     Work,
 )
 from ocp.internal import (
     MethodProgram,
+    MethodSolver,
     RunData,
     RunResult,
     check_instance,
@@ -41,7 +41,7 @@ Boundary = Literal[2, 3, 4]
 
 
 @dataclass(frozen=True)
-class ReverseShooting(Solver):
+class ReverseShooting(MethodSolver):
     r"""Integrate backwards from the end manifold, where the costate is known.
 
     .. math:: r_1(t_1) = f(\theta(t_1)), \quad \psi(t_1) = \varphi_x(\theta(t_1))

@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
+from ocp.method.method_solver import MethodSolver
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled
 from ocp.solution.solution import Solution
-from ocp.solution.solver import InitialGuess, Program, Solver
+from ocp.solution.solver import InitialGuess, Program
 
 
-class ScalingSolver(Solver):
+@dataclass(frozen=True)
+class ScalingSolver(MethodSolver):
     """A solver that iterates on numbers, and so measures a problem in sizes of its own.
 
     Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.

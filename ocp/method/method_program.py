@@ -9,10 +9,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.method.judged import judged
+from ocp.method.method_solver import MethodSolver
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import ControlKind, Solution, Work
-from ocp.solution.solver import InitialGuess, Program, Solver
+from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
 
 
@@ -44,7 +46,7 @@ class MethodProgram(Program):
         ocp: the problem.
     """
 
-    solver: Solver
+    solver: MethodSolver
     ocp: OCP
 
     def run(
@@ -55,12 +57,12 @@ class MethodProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Solve for these data, see ``Program.run``."""
+        """Solve for these data, see ``Program.run``, and compare a success with the referee."""
         started = perf_counter()
         data = RunData.of(self.ocp, x0, t0, parameters)
         result = self._solve(data, self._first_guess(guess))
         seconds = perf_counter() - started
-        return Solution(
+        solution = Solution(
             problem=self.ocp,
             solver=self._solver_text,
             status=result.status,
@@ -80,6 +82,7 @@ class MethodProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
+        return judged(solution, self.solver.success_accuracy) if self.solver.judged else solution
 
     @abstractmethod
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:

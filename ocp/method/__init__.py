@@ -1,0 +1,1 @@
+"""One run for all methods: solve, then compare a success with the referee."""

@@ -1,0 +1,40 @@
+"""What the solvers of all methods have in common: a success is compared with the referee."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+from ocp.problem.ocp import OCP
+from ocp.solution.solver import Program, Solver
+
+#: By how much own cost and the referee's may differ, relative, where a solver has no option.
+ACCURACY = 1e-2
+
+
+@dataclass(frozen=True)
+class MethodSolver(Solver):
+    """A solver whose program is a ``MethodProgram``.
+
+    Attributes:
+        judged: whether a success is compared with the referee, see ``judged``. A control loop
+            and methods that do it by themselves switch it off.
+    """
+
+    judged: bool = field(default=True, kw_only=True, repr=False, compare=False)
+
+    @abstractmethod
+    def build(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem."""
+
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success; inf: none is looked for."""
+        return ACCURACY
+
+    def unjudged(self) -> Self:
+        """Return the solver without the comparison."""
+        return replace(self, judged=False)
+
+    def for_control_loop(self, *, compiled: bool, time_limit: float) -> Solver:
+        """Compare nothing: a step has no time for it; see ``Solver``."""
+        return self.unjudged()

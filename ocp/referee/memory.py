@@ -1,0 +1,48 @@
+"""What the referee found lately: nobody pays twice for the same trajectory."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import TypeVar
+
+from ocp.problem.cache import once_per_problem
+from ocp.problem.ocp import OCP
+from ocp.solution.solution import Solution
+
+T = TypeVar("T")
+
+# Evaluations kept for each problem.
+_KEPT = 16
+
+
+def remembered(
+    judge: Callable[[Solution, float], T],
+) -> Callable[[Solution, float], T]:
+    """Decorate a function of a solution and a tolerance so that its latest results are kept.
+
+    They are found by the solution's numbers, so that a copy with another status, message or time
+    finds them as well, and one whose arrays were changed does not.
+    """
+
+    def empty(ocp: OCP) -> OrderedDict[tuple, T]:
+        return OrderedDict()
+
+    kept = once_per_problem(empty)
+
+    def found(solution: Solution, tolerance: float) -> T:
+        results, key = kept(solution.problem), _numbers(solution, tolerance)
+        if key not in results:
+            results[key] = judge(solution, tolerance)
+        results.move_to_end(key)
+        if len(results) > _KEPT:
+            results.popitem(last=False)
+        return results[key]
+
+    return found
+
+
+def _numbers(solution: Solution, tolerance: float) -> tuple:
+    """Return everything that a verdict depends on, as a key."""
+    s = solution
+    arrays = (s.t, s.x, s.x0, s.costate, s.u, s.breaks)
+    given = ((name, value.tobytes()) for name, value in s.data.values.as_dict().items())
+    return (tolerance, s.control_kind, *(array.tobytes() for array in arrays), *given)
