@@ -27,6 +27,7 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
+from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
@@ -62,6 +63,7 @@ __all__ = [
     "interpolate",
     "judged",
     "most_violated",
+    "segment_gaps",
     "stage_hessian",
     "start_violation",
     "stationary",

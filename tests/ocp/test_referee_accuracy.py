@@ -195,7 +195,6 @@ def pulled_back(rate: float, n: int = 200) -> tuple[Solution, float]:
     h = 1.0 / n
     factor = (exp(-rate * h) - exp(rate * h)) * rate / expm1(rate * h)
     u = factor * np.exp(-rate * h * np.arange(n))
-    cost, _ = settled(-rate, 1.0, u, h)
     nodes = np.exp(-rate * h * np.arange(n + 1))[:, None]
     ocp = problem(rate * X + U, X**2 + U**2, x0=1.0)
     one = h * float(u @ u) + sum(
