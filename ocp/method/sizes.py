@@ -11,8 +11,8 @@ from ocp.solution.solution import Solution
 
 # What is this part of its size counts as zero.
 _ZERO = 1e-6
-# Smaller states and controls tell nothing about their sizes.
-_SMALLEST = 1e-15
+# Smaller states and controls are what an iteration has left of zero, and tell no size.
+_SMALLEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +32,12 @@ class SampledSizes:
     def states(self) -> np.ndarray:
         """Sizes of the states, from the solution and the bounds, (nx,)."""
         box = self.solution.problem.state_bounds
-        return _largest(np.vstack([self.solution.x, self.solution.x0]), box)
+        return _size(self.solution.x, np.abs(self.solution.x0), box)
 
     @cached_property
     def controls(self) -> np.ndarray:
         """Sizes of the controls, from the solution and the bounds, (nu,)."""
-        return _largest(self.solution.u, self.solution.problem.control_bounds)
+        return _size(self.solution.u, np.zeros(1), self.solution.problem.control_bounds)
 
     @property
     def state_floor(self) -> np.ndarray:
@@ -77,9 +77,16 @@ class SampledSizes:
         return np.nan_to_num(np.max(changes, axis=0), nan=0.0, posinf=0.0)
 
 
-def _largest(values: np.ndarray, box: Box) -> np.ndarray:
-    """Return the largest magnitude of each column and its finite bounds; 1 where none is known."""
-    bounds = [np.broadcast_to(np.abs(b), values.shape[1]) for b in (box.lower, box.upper)]
-    known = np.vstack([np.abs(values), *(np.where(np.isfinite(b), b, 0.0) for b in bounds)])
-    size = known.max(axis=0, initial=0.0)
-    return np.where(size > _SMALLEST, size, 1.0)
+def _size(values: np.ndarray, given: np.ndarray, box: Box) -> np.ndarray:
+    """Return the size of each column of values: from data, as it occurs, or 1 where it is zero.
+
+    Args:
+        values: (K, n).
+        given: what the problem gives, (n,) or (1,), not negative.
+        box: bounds.
+    """
+    bounds = np.abs(np.array([np.broadcast_to(b, values.shape[1]) for b in (box.lower, box.upper)]))
+    data = np.maximum(given, np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0))
+    occurs = np.abs(values).max(axis=0, initial=0.0)
+    known = np.maximum(data, np.where(occurs > _SMALLEST, occurs, 0.0))
+    return np.where(known > 0.0, known, 1.0)
