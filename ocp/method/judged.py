@@ -60,10 +60,6 @@ def _fault(solution: Solution, verdict: Evaluation, accuracy: float, slack: floa
     """Return what contradicts a success; empty where nothing does."""
     if not np.isfinite(verdict.cost):
         return f"integrated accurately, {verdict.worst}: {_ADVICE}"
-    rounding = float(np.finfo(float).eps)
-    if verdict.growth is not None and rounding * verdict.growth > _MOST_ROUNDING:
-        growth = f"{verdict.growth:.0e}".replace("e+", "e")
-        return f"open loop, errors grow by {growth}: only a feedback can follow it"
     is_discrete = solution.problem.model.is_discrete
     fault = "" if is_discrete else _cost_fault(solution, verdict, accuracy)
     fault = fault or _end_fault(solution, verdict, accuracy, slack)
