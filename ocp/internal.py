@@ -35,6 +35,7 @@ from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
+from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
@@ -77,6 +78,7 @@ __all__ = [
     "judged",
     "most_violated",
     "scaled",
+    "segment_gaps",
     "sizes_of",
     "stage_hessian",
     "start_violation",

@@ -109,7 +109,7 @@ def _newton(program: IndirectShootingProgram, guess: Solution) -> Solution:
 def _on_finer_grid(solution: Solution) -> Solution:
     """Return the direct solution on another grid, finer if it may be, or the same one."""
     intervals = min(_FINER * (len(solution.t) - 1), _MOST_INTERVALS)
-    coarse = MultipleShooting(intervals, judged=False)
+    coarse = MultipleShooting(intervals).unjudged()
     data, program = solution.data, coarse.build(solution.problem)
     finer_grid = program.run(x0=data.x0, t0=data.t0, parameters=solution.parameters, guess=solution)
     return finer_grid if finer_grid.status.is_success else solution

@@ -22,26 +22,33 @@ _MOST_ROUNDING = 1e-2
 _ADVICE = "more intervals or a better integrator"
 
 
-def judged(solution: Solution, accuracy: float, *, between_nodes: bool = True) -> Solution:
+def judged(
+    solution: Solution, accuracy: float, *, slack: float = 0.0, between_nodes: bool = True
+) -> Solution:
     """Return a solution whose status agrees with the referee.
 
     A success becomes ``INACCURATE``, with numbers, where its own cost and the referee's differ
     by more than the accuracy, relative to the cost; where the referee does not know the cost
     that well; where an initial or terminal constraint is missed by more, relative to the size
-    of its row; and where the dynamics amplify rounding until no open-loop plan means anything.
+    of its row; and, in continuous time, where the dynamics amplify rounding until no open-loop
+    plan means anything.
     Where a path constraint or a state bound is violated between the nodes by more than 1e-6 of
     its row's size, the status stays and the message says so.
 
     Args:
         solution: of any status; only a success is judged.
         accuracy: relative; inf: nothing is compared.
+        slack: by how much a terminal constraint may be missed in any case, in its own unit.
         between_nodes: whether violations between the nodes are mentioned.
     """
     if not solution.status.is_success or not np.isfinite(accuracy):
         return solution
     verdict = evaluate(solution)
-    if fault := _fault(solution, verdict, accuracy):
+    if fault := _fault(solution, verdict, accuracy, slack):
         return _saying(solution, fault).with_(status=Status.INACCURATE)
+    if growth := _growth(verdict):
+        status = solution.status if solution.problem.model.is_discrete else Status.INACCURATE
+        return _saying(solution, growth).with_(status=status)
     if between_nodes and (found := _between_nodes(solution, verdict)):
         return _saying(solution, found)
     return solution
@@ -52,18 +59,23 @@ def _saying(solution: Solution, added: str) -> Solution:
     return solution.with_(message=f"{solution.message}; {added}" if solution.message else added)
 
 
-def _fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str:
+def _fault(solution: Solution, verdict: Evaluation, accuracy: float, slack: float) -> str:
     """Return what contradicts a success; empty where nothing does."""
     if not np.isfinite(verdict.cost):
         return f"integrated accurately, {verdict.worst}: {_ADVICE}"
-    rounding = float(np.finfo(float).eps)
-    if verdict.growth is not None and rounding * verdict.growth > _MOST_ROUNDING:
-        growth = f"{verdict.growth:.0e}".replace("e+", "e")
-        return f"open loop, errors grow by {growth}: only a feedback can follow it"
     is_discrete = solution.problem.model.is_discrete
     fault = "" if is_discrete else _cost_fault(solution, verdict, accuracy)
-    fault = fault or _end_fault(solution, verdict, accuracy)
+    fault = fault or _end_fault(solution, verdict, accuracy, slack)
     return f"{fault}: {_advice(solution)}" if fault else ""
+
+
+def _growth(verdict: Evaluation) -> str:
+    """Return by how much errors grow, where that leaves nothing of an open-loop plan."""
+    rounding = float(np.finfo(float).eps)
+    if verdict.growth is None or rounding * verdict.growth <= _MOST_ROUNDING:
+        return ""
+    growth = f"{verdict.growth:.0e}".replace("e+", "e")
+    return f"open loop, errors grow by {growth}: only a feedback can follow it"
 
 
 def _cost_fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str:
@@ -76,7 +88,7 @@ def _cost_fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str
     return f"the referee knows the cost {cost:.6g} only to {error:.2g}"
 
 
-def _end_fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str:
+def _end_fault(solution: Solution, verdict: Evaluation, accuracy: float, slack: float) -> str:
     truth = verdict.truth
     functions = solution.problem.functions
     for rows, values, _ in values_at_ends(solution, truth):
@@ -85,7 +97,8 @@ def _end_fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str:
         is_initial = rows.rows[0].place == "initial"
         function = functions.initial if is_initial else functions.terminal
         size = np.maximum(_largest_along(solution, function), _bounds(rows))
-        off = excess > accuracy * np.maximum(size, _ZERO * _sizes_of_rows(solution, rows))
+        size = np.maximum(size, _ZERO * _sizes_of_rows(solution, rows))
+        off = excess > accuracy * size + slack * (not is_initial)
         if off.any():
             i = int(np.where(off, excess, 0.0).argmax())
             return f"{rows.rows[i]} is missed by {excess[i]:.2g}"

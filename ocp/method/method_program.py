@@ -82,7 +82,9 @@ class MethodProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
-        return judged(solution, self.solver.success_accuracy) if self.solver.judged else solution
+        if not self.solver.judged:
+            return solution
+        return judged(solution, self.solver.success_accuracy, slack=self.solver.end_slack)
 
     @abstractmethod
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:

@@ -31,6 +31,11 @@ class MethodSolver(Solver):
         """The accepted relative error of a success; inf: none is looked for."""
         return ACCURACY
 
+    @property
+    def end_slack(self) -> float:
+        """By how much a terminal constraint may be missed in any case, in its own unit."""
+        return 0.0
+
     def unjudged(self) -> Self:
         """Return the solver without the comparison."""
         return replace(self, judged=False)

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replayed
 from ocp.referee.refinement import ROUNDING, end_moved, is_resolved, refined
-from ocp.referee.segments import is_amplified
+from ocp.referee.segments import gaps, is_amplified
 from ocp.solution.solution import Solution
 
 # CVODES integrates with these tolerances; a multiple of the last difference and a part of the
@@ -15,6 +17,8 @@ _OF_LAST, _OF_LARGEST = 2.0, 0.25
 _FEWEST_SAMPLES = 400
 # A finite trajectory of more intervals is left to explicit steps: CVODES begins anew in each.
 _MANY_INTERVALS = 2000
+# Of the cost, where only the states are asked for.
+_GAP_TOLERANCE = 1e-6
 
 
 def integrate_controls(solution: Solution, *, tolerance: float = 1e-9) -> ReferenceTrajectory:
@@ -40,6 +44,15 @@ def integrate_controls(solution: Solution, *, tolerance: float = 1e-9) -> Refere
     if not is_amplified(in_open_loop, by_segments):
         return in_open_loop
     return _best(by_segments, tolerance)
+
+
+def segment_gaps(solution: Solution) -> np.ndarray:
+    """Return by how much the controls, from node to node, miss the solution's next state, (N, nx).
+
+    By the method that suits the dynamics, also where they are stiff; inf where none does.
+    """
+    by_segments = _best(Replayed(solution, "by segments"), _GAP_TOLERANCE)
+    return gaps(solution, by_segments)
 
 
 def _best(replayed: Replayed, tolerance: float) -> ReferenceTrajectory:

@@ -75,7 +75,7 @@ class Solution:
         history: cost and residual per iteration, as far as the method has them.
         parameters: parameter values and signals of this run, by name.
         build_time: time of ``build`` [s].
-        solve_time: time of ``run`` [s].
+        solve_time: time of the method in ``run`` [s]; the comparison with the referee comes on top.
     """
 
     problem: OCP

@@ -89,6 +89,16 @@ class GridDP(MethodSolver):
         for name in ("terminal_slack", "accuracy", "memory"):
             check_not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
 
+    @property
+    def success_accuracy(self) -> float:
+        """The accepted relative error of a success."""
+        return self.accuracy
+
+    @property
+    def end_slack(self) -> float:
+        """By how much a terminal constraint may be missed."""
+        return self.terminal_slack
+
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
         check_instance(ocp, OCP, "GridDP: the problem")

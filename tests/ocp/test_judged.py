@@ -11,6 +11,7 @@ from solvers import (
     Collocation,
     IndirectShooting,
     MultipleShooting,
+    Riccati,
     Schuetz,
     StagewiseNewton,
     polish,
@@ -150,3 +151,13 @@ def test_a_control_loop_does_not_pay_at_all() -> None:
         assert not solver.for_control_loop(compiled=False, time_limit=1.0).judged
     box = integrator(control_bounds=Box(-1.0, 1.0))
     assert solve(box, MultipleShooting(5, judged=False)).status is Status.SOLVED
+
+
+def test_discrete_plans_that_only_a_feedback_can_follow_are_solved_and_say_so() -> None:
+    """x+ = 4 x + u over 40 steps: errors grow by 4^40 = 1e24; nothing is integrated."""
+    model = Model(name="doubling", x=X, u=U, f=4.0 * X + U, dt=0.1)
+    ocp = OCP(name="d", model=model, x0=[1.0], horizon=40, running_cost=X**2 + U**2)
+    solution = solve(ocp, Riccati())
+    assert solution.status is Status.SOLVED
+    assert "open loop, errors grow by 1e24" in solution.message
+    assert evaluate(solution).cost == pytest.approx(solution.cost, rel=1e-9)

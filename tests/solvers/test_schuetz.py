@@ -88,7 +88,7 @@ def test_a_fixed_step_climbs_with_conjugate_directions_only() -> None:
     assert costs[-1] > 1e3 * costs.min()
     assert np.all(np.diff(costs[costs.argmin() :]) > 0.0)
     assert climbing.cost == costs.min()
-    staying = solve(ocp, Schuetz(direction="steepest", **options))
+    staying = solve(ocp, Schuetz(direction="steepest", judged=False, **options))
     costs = history(staying)
     assert staying.status is Status.STATIONARY
     assert costs[-1] == pytest.approx(costs.min(), rel=1e-5)  # of Euler's cost, not of its gradient
