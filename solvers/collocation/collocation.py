@@ -20,6 +20,7 @@ from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
 from solvers.collocation.defects import Defects
 from solvers.collocation.mesh import CollocationGrid, Mesh
+from solvers.direct.first_trajectory import first_duration, other_starts, tame
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 
@@ -132,8 +133,13 @@ class CollocationProgram(MethodProgram):
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        first = self._first_iterate(data, guess)
-        outcome = self._nlp_run.solve(first.joined(), data)
+        ocp, duration = self.ocp, first_duration(self.ocp, guess)
+
+        def first(duration: float, held: bool) -> np.ndarray:
+            return self._first_iterate(data, guess, duration, held=held).joined()
+
+        others = tuple(other_starts(ocp, guess, duration, first))
+        outcome = self._nlp_run.solve(first(duration, False), data, others)
         return self._result(data, outcome)
 
     @cached_property
@@ -143,19 +149,21 @@ class CollocationProgram(MethodProgram):
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> CollocationUnknowns:
-        """States and controls of the guess; without states, the controls' own roll-out."""
+    def _first_iterate(
+        self, data: RunData, guess: InitialGuess | None, duration: float, *, held: bool
+    ) -> CollocationUnknowns:
+        """States and controls of the guess; without states, the roll-out, or the start ``held``."""
         grid, ocp = self.transcription.grid, self.transcription.ocp
         m = ocp.model
         at_points = guess.sample("u", grid.at, m.nu) if guess else None
         u = np.zeros((len(grid.at), m.nu)) if at_points is None else at_points
         c = ocp.control_bounds.clip(self._coefficients(u))
-        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
-        if x is None:
-            x = self.defects.rollout(self._elevated(c), duration, data)
-        if not np.isfinite(x).all():
+        if x is None and held:
             x = np.tile(data.x0, (len(grid.nodes), 1))
+        elif x is None:
+            x = self.defects.rollout(self._elevated(c), duration, data)
+            x = tame(x, data.x0, ocp.state_bounds)
         z = x[grid.edge_nodes].T
         z = np.vstack([z, np.full((1, z.shape[1]), duration)]) if ocp.has_free_time else z
         return CollocationUnknowns(z, c.T, x[grid.point_nodes].T)

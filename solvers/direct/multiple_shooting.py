@@ -16,6 +16,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
+from solvers.direct.first_trajectory import first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_run import NlpOutcome, NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
@@ -108,9 +109,18 @@ class MultipleShootingProgram(MethodProgram):
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        z, u = self.first_iterate(data, guess)
-        outcome = self._nlp_run.solve(self.transcription.join(z, u), data)
-        return self._result(data, outcome)
+        ocp, duration = self.ocp, first_duration(self.ocp, guess)
+
+        def first(duration: float, held: bool) -> np.ndarray:
+            return self.transcription.join(*self._iterate(data, guess, duration, held=held))
+
+        w0, others = first(duration, False), tuple(other_starts(ocp, guess, duration, first))
+        run = self._nlp_run
+        outcome = run.solve(w0, data, others)
+        if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
+            run = self._nlp_run_without_slope
+            outcome = run.solve(w0, data, others).after(outcome)
+        return self._result(data, outcome, run)
 
     @cached_property
     def _nlp_run(self) -> NlpRun:
@@ -123,17 +133,27 @@ class MultipleShootingProgram(MethodProgram):
             feasibility_restoration=self.solver.feasibility_restoration,
         )
 
+    @cached_property
+    def _nlp_run_without_slope(self) -> NlpRun:
+        """For a fixed start at which a slope is not finite: nothing is differentiated there."""
+        transcription = replace(self.transcription, start_as_data=True, compiled=False)
+        nlp = self.solver.nlp_backend.build(transcription)
+        return replace(self._nlp_run, transcription=transcription, nlp=nlp)
+
     # -- the first iterate -------------------------------------------------------------------
 
     def first_iterate(
         self, data: RunData, guess: InitialGuess | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states and controls of the guess, a free final time with the states."""
-        tr, ocp = self.transcription, self.transcription.ocp
-        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
-        x, u = self.grid.first_iterate(data, guess, duration)
-        z = np.hstack([x, np.full((tr.n + 1, 1), duration)]) if ocp.has_free_time else x
-        return z, u
+        return self._iterate(data, guess, first_duration(self.ocp, guess), held=False)
+
+    def _iterate(
+        self, data: RunData, guess: InitialGuess | None, duration: float, *, held: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        x, u = self.grid.first_iterate(data, guess, duration, held=held)
+        time = np.full((len(x), int(self.ocp.has_free_time)), duration)
+        return np.hstack([x, time]), u
 
     # -- the result ---------------------------------------------------------------------------
 
@@ -144,14 +164,14 @@ class MultipleShootingProgram(MethodProgram):
         schedule = self.grid.schedule(data, tr.duration(result.w))
         return self.grid.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _result(self, data: RunData, outcome: NlpOutcome) -> RunResult:
+    def _result(self, data: RunData, outcome: NlpOutcome, run: NlpRun) -> RunResult:
         """The last result, with the work of all runs."""
-        tr, result = self.transcription, outcome.last
+        tr, result = run.transcription, outcome.last
         z, u = tr.split(result.w)
         return RunResult(
             status=outcome.status,
             message=outcome.message,
-            t=self._nlp_run.times(result, data),
+            t=run.times(result, data),
             x=z[:, : tr.ocp.model.nx],
             costate=tr.costates(result.w, result.lam_x, result.lam_g, data),
             u=u,

@@ -191,6 +191,11 @@ class NlpResult:
         return str(self.stats.get("return_status", ""))
 
     @property
+    def is_undefined(self) -> bool:
+        """Whether the backend met a number that is not finite."""
+        return not np.isfinite(self.cost) or self.return_status == "Invalid_Number_Detected"
+
+    @property
     def iterations(self) -> int:
         """Number of iterations."""
         return int(self.stats.get("iter_count", 0))

@@ -1,30 +1,32 @@
-"""How a direct method solves its nonlinear program: up to four phases around a backend.
+"""How a direct method solves its nonlinear program: phases around a backend.
 
-``NlpRun.solve`` names them: solve from the first iterate; solve again from perturbed controls if
-the backend did not move; restore feasibility if it failed; solve again from there. Each phase
-returns an ``NlpOutcome``, or the trajectory that violates the constraints least.
+``NlpRun.solve`` names them: solve from the first iterate, and again from there where the answer is
+one only after the backend's scaling; solve from perturbed controls where some did not move; restore
+feasibility if it failed, and solve from there; solve from other first iterates. Each phase returns
+an ``NlpOutcome``.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from ocp import Status, Work
-from ocp.internal import ConstraintRow, RunData, Violation, start_violation
-from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
-from solvers.direct.nlp_backends import Nlp, NlpResult
+from ocp.internal import RunData, start_violation
+from solvers.direct.curvature_check import has_negative_curvature
+from solvers.direct.feasibility_restoration import FeasibilityRestoration
+from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
+from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
+from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved
 
-# Constraint violations above this count, also if the backend accepts them after scaling.
-_VIOLATED = 1e-6
-# Standard deviation of the perturbation of the controls, relative to 1 + abs(u).
-_PERTURBATION = 1e-3
-# Changes of the controls below this, relative to 1 + abs(u), count as none.
-_UNCHANGED = 1e-6
 # A least violation up to this counts as feasible: the elastic problem is solved to its tolerance.
 _FEASIBLE = 1e-5
+# A lower cost counts from this on, relative to 1 + abs(cost).
+_LOWER = 1e-6
 # Failures that an infeasible problem may cause. INACCURATE is one of them: to meet a constraint
 # that cannot be met an optimiser may exploit the integrator's error.
 _MAYBE_INFEASIBLE = (
@@ -33,6 +35,25 @@ _MAYBE_INFEASIBLE = (
     Status.FAILED,
     Status.INACCURATE,
 )
+# Failures that a first iterate may cause.
+_MAYBE_FIRST_ITERATE = (
+    Status.INFEASIBLE,
+    Status.ITERATION_LIMIT,
+    Status.DIVERGED,
+    Status.FAILED,
+)
+
+
+class OtherStart(NamedTuple):
+    """Another first iterate.
+
+    Attributes:
+        words: what it is, for messages.
+        make: returns the unknowns.
+    """
+
+    words: str
+    make: Callable[[], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,15 +96,14 @@ class NlpOutcome:
         values = self.last.history("inf_du")
         return float(values[-1]) if values.size else 0.0
 
+    @property
+    def is_undefined(self) -> bool:
+        """Whether a backend met a number that is not finite."""
+        return any(result.is_undefined for result in self.results)
 
-@dataclass(frozen=True, eq=False)
-class _Inputs:
-    """The inputs of one solve: first iterate w0 within its bounds, p, bounds; ``data`` as given."""
-
-    w0: np.ndarray
-    p: np.ndarray
-    bounds: dict[str, np.ndarray]
-    data: RunData
+    def after(self, earlier: "NlpOutcome") -> "NlpOutcome":
+        """Return this outcome with the work of an earlier one."""
+        return replace(self, results=(*earlier.results, *self.results))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +116,7 @@ class NlpRun:
         accuracy: the largest accepted error of a state, relative to 1 + abs(x).
         state_error: (result, data) -> the largest such error, and the node where it occurs.
         feasibility_restoration: whether a failure is followed by a search for the least
-            violating trajectory.
+            violating trajectory, and by other first iterates.
     """
 
     transcription: TranscribedProblem
@@ -105,54 +125,120 @@ class NlpRun:
     state_error: Callable[[NlpResult, RunData], tuple[float, int]]
     feasibility_restoration: bool = True
 
-    def solve(self, w0: np.ndarray, data: RunData) -> NlpOutcome:
-        """Solve for these data from a first iterate, which is clipped to the bounds."""
-        inputs = self._inputs(w0, data)
-        outcome = self.first_solve(inputs)
-        if outcome.status is Status.SOLVED and not self._has_moved(inputs.w0, outcome.last.w):
-            outcome = self.solve_from_perturbed(inputs, outcome)
-        if not self._may_be_infeasible(outcome):
-            return outcome
-        least = self.restore_feasibility(inputs)
-        if least is None:
-            return outcome
-        if least.violation <= _FEASIBLE:
-            return self.resolve(inputs, outcome, least)
-        return self._infeasible(inputs, outcome, least)
+    def solve(
+        self, w0: np.ndarray, data: RunData, others: Sequence[OtherStart] = ()
+    ) -> NlpOutcome:
+        """Solve for these data from a first iterate, which is clipped to the bounds.
+
+        Args:
+            w0: first iterate.
+            data: of the run.
+            others: first iterates to try before a failure is reported.
+        """
+        started, inputs = perf_counter(), self._inputs(w0, data)
+        outcome = self._run_to_an_optimum(inputs)
+        if self._may_be_infeasible(outcome):
+            outcome = self.restore_feasibility(inputs, outcome)
+        if self._may_start_elsewhere(outcome, data):
+            outcome = self.solve_from_others(outcome, others, data, started)
+        return outcome
 
     # -- the phases ------------------------------------------------------------------------------
 
-    def first_solve(self, inputs: _Inputs) -> NlpOutcome:
-        """Run the backend from the first iterate."""
-        return self._run(inputs, inputs.w0, ())
+    def first_solve(self, inputs: NlpInputs) -> NlpOutcome:
+        """Run the backend from the first iterate, and again where only its scaling was met."""
+        outcome = self._run(self.nlp, inputs, inputs.w0)
+        if outcome.status is Status.FAILED and outcome.last.success:
+            outcome = self._run(self.nlp, inputs, outcome.last.w).after(outcome)
+        return outcome
 
-    def solve_from_perturbed(self, inputs: _Inputs, first: NlpOutcome) -> NlpOutcome:
+    def solve_from_perturbed(self, inputs: NlpInputs, first: NlpOutcome) -> NlpOutcome:
         """Run the backend from a perturbation of its result.
 
         A backend tests curvature along its steps only: one that makes none accepts a maximum or
-        a saddle as well. From a minimum the second run returns at once.
+        a saddle as well. From a minimum the second run returns at once. fatrop may return to a
+        saddle even so: then IPOPT decides.
         """
-        w = self._perturbed(first.last.w, inputs.bounds)
-        second = self.nlp.solve(w, inputs.p, inputs.bounds)
-        if second.is_lost:
-            message = f"from perturbed controls, {self._lost(second)}"
-            return NlpOutcome((second, *first.results), Status.STATIONARY, message)
-        return NlpOutcome((*first.results, second), *self._judge(inputs, second))
+        every = np.ones(self.transcription.ocp.model.nu, dtype=bool)
+        w = perturbed(self.transcription, inputs, first.last.w, every)
+        second = self._run(self.nlp, inputs, w)
+        if second.last.is_lost:
+            message = f"from perturbed controls, {second.message}"
+            return NlpOutcome((second.last, *first.results), Status.STATIONARY, message)
+        is_checked = self.nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
+        if is_checked or not has_negative_curvature(self.nlp.function, second.last, inputs):
+            return second.after(first)
+        return self._run(self._ipopt, inputs, w).after(second.after(first))
 
-    def restore_feasibility(self, inputs: _Inputs) -> LeastViolation | None:
-        """Find the least violating trajectory near the first iterate; None if that fails."""
-        return self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+    def solve_from_some_perturbed(
+        self, inputs: NlpInputs, first: NlpOutcome, which: np.ndarray
+    ) -> NlpOutcome:
+        """Run the backend from a result with some controls perturbed; keep the better answer.
 
-    def resolve(self, inputs: _Inputs, failed: NlpOutcome, least: LeastViolation) -> NlpOutcome:
-        """Run the backend again, from a feasible trajectory."""
-        return self._run(inputs, least.result.w, (*failed.results, least.result))
+        Where the derivative in a control vanishes by symmetry no step changes it, at a saddle as
+        little as at a minimum.
+        """
+        w = perturbed(self.transcription, inputs, first.last.w, which)
+        second = self._run(self.nlp, inputs, w)
+        is_lower = second.last.cost < first.last.cost - _LOWER * (1.0 + abs(first.last.cost))
+        if second.status.is_success and is_lower:
+            return second.after(first)
+        violation, _ = self.transcription.worst(second.last.w, second.last.g, inputs.bounds)
+        kept = first.after(second)
+        if violation > _FEASIBLE or not is_lower:
+            return kept
+        names = [n for n, on in zip(self.transcription.ocp.model.u_names, which, strict=True) if on]
+        message = (
+            f"no minimum: from perturbed {', '.join(names)} the cost falls to "
+            f"{second.last.cost:.6g}, where {self.nlp.backend.name} ended with {second.status.name}"
+        )
+        return replace(kept, status=Status.STATIONARY, message=message)
+
+    def restore_feasibility(self, inputs: NlpInputs, failed: NlpOutcome) -> NlpOutcome:
+        """Find the least violating trajectory; from a feasible one, run the backend again."""
+        least = self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+        if least is None:
+            return failed
+        found = replace(failed, results=(*failed.results, least.result))
+        if least.violation <= _FEASIBLE:
+            return self._run(self.nlp, inputs, least.result.w).after(found)
+        message = self._verdict.where(least.result, inputs.data, least.violation, least.row)
+        return replace(found, status=Status.INFEASIBLE, message=message)
+
+    def solve_from_others(
+        self, failed: NlpOutcome, others: Sequence[OtherStart], data: RunData, started: float
+    ) -> NlpOutcome:
+        """Solve from other first iterates, until one succeeds or the time limit has passed."""
+        tried: list[str] = []
+        results = failed.results
+        for other in others:
+            if perf_counter() - started > self.nlp.backend.time_limit:
+                break
+            outcome = self._run_to_an_optimum(self._inputs(other.make(), data))
+            tried.append(other.words)
+            if outcome.status.is_success:
+                said = f"from {other.words}; from the first guess: {failed.status.name}"
+                message = "; ".join(part for part in (outcome.message, said) if part)
+                results = (*results, *outcome.results)
+                return NlpOutcome(results, outcome.status, message)
+            results = (*outcome.results, *results)
+        if not tried:
+            return failed
+        said = f"{failed.message}; nor from {', '.join(tried)}"
+        return NlpOutcome(results, failed.status, said)
 
     # -- when to enter a phase -------------------------------------------------------------------
 
-    def _has_moved(self, w0: np.ndarray, w: np.ndarray) -> bool:
-        """Whether any control differs from the first iterate's."""
-        before, after = (each[self.transcription.is_control] for each in (w0, w))
-        return bool(np.any(np.abs(after - before) > _UNCHANGED * (1.0 + np.abs(before))))
+    def _run_to_an_optimum(self, inputs: NlpInputs) -> NlpOutcome:
+        """Run from a first iterate, and from perturbed controls where some did not move."""
+        first, problem = self.first_solve(inputs), self.transcription
+        if first.status is not Status.SOLVED:
+            return first
+        still = unmoved(problem, inputs, first.last.w)
+        if still.all():
+            return self.solve_from_perturbed(inputs, first)
+        hidden = still & ~at_bounds(problem, inputs, first.last.w)
+        return self.solve_from_some_perturbed(inputs, first, hidden) if hidden.any() else first
 
     def _may_be_infeasible(self, outcome: NlpOutcome) -> bool:
         ocp = self.transcription.ocp
@@ -161,84 +247,40 @@ class NlpRun:
             self.feasibility_restoration and is_constrained and outcome.status in _MAYBE_INFEASIBLE
         )
 
+    def _may_start_elsewhere(self, outcome: NlpOutcome, data: RunData) -> bool:
+        return (
+            self.feasibility_restoration
+            and outcome.status in _MAYBE_FIRST_ITERATE
+            and not start_violation(self.transcription.ocp, data)
+        )
+
     # -- what the phases use ---------------------------------------------------------------------
 
     @cached_property
     def _restoration(self) -> FeasibilityRestoration:
         return FeasibilityRestoration(self.transcription, self.nlp.backend.time_limit)
 
-    def _inputs(self, w0: np.ndarray, data: RunData) -> _Inputs:
+    @cached_property
+    def _verdict(self) -> NlpVerdict:
+        return NlpVerdict(self.transcription, self.nlp, self.accuracy, self.state_error)
+
+    @cached_property
+    def _ipopt(self) -> Nlp:
+        """IPOPT for the same program, built where fatrop's answer may be a saddle."""
+        backend: NlpBackend = replace(self.nlp.backend, name="ipopt")
+        return backend.build(self.transcription)
+
+    def _inputs(self, w0: np.ndarray, data: RunData) -> NlpInputs:
         bounds = self.transcription.bounds(data)
         w0 = np.clip(w0, bounds["lbx"], bounds["ubx"])
-        return _Inputs(w0, self.transcription.data_vector(data), bounds, data)
+        return NlpInputs(w0, self.transcription.data_vector(data), bounds, data)
 
-    def _run(self, inputs: _Inputs, w: np.ndarray, earlier: tuple[NlpResult, ...]) -> NlpOutcome:
-        """Run the backend from an iterate, after earlier runs."""
-        result = self.nlp.solve(w, inputs.p, inputs.bounds)
-        return NlpOutcome((*earlier, result), *self._judge(inputs, result))
-
-    def _perturbed(self, w: np.ndarray, bounds: dict[str, np.ndarray]) -> np.ndarray:
-        """Return unknowns with slightly different controls; the same for the same unknowns."""
-        w, at = w.copy(), self.transcription.is_control
-        u = w[at]
-        w[at] += _PERTURBATION * np.random.default_rng(0).normal(size=u.shape) * (1.0 + np.abs(u))
-        return np.clip(w, bounds["lbx"], bounds["ubx"])
-
-    # -- status and message ----------------------------------------------------------------------
-
-    def _judge(self, inputs: _Inputs, result: NlpResult) -> tuple[Status, str]:
-        """Status and message, from the backend's status, the constraints and the integrator."""
-        if result.is_lost:
-            return Status.FAILED, self._lost(result)
-        if not np.isfinite(result.cost):
-            status = result.return_status
-            return Status.DIVERGED, f"the backend met a number that is not finite ({status})"
-        violation, row = self.transcription.worst(result.w, result.g, inputs.bounds)
-        is_violated = violation > _VIOLATED
-        if result.success and not is_violated:
-            return self._judge_solution(inputs, result)
-        where = self._where(result, inputs.data, violation, row) if is_violated else ""
-        return self._judge_failure(result, where)
-
-    def _judge_solution(self, inputs: _Inputs, result: NlpResult) -> tuple[Status, str]:
-        """Status of a result that meets the constraints."""
-        if message := start_violation(self.transcription.ocp, inputs.data):
-            return Status.INFEASIBLE, message
-        error, node = self.state_error(result, inputs.data)
-        if error <= self.accuracy:
-            return Status.SOLVED, ""
-        t = self.times(result, inputs.data)[node]
-        return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t:.4g} s"
-
-    def _judge_failure(self, result: NlpResult, where: str) -> tuple[Status, str]:
-        """Status of a result that the backend or a constraint rejects."""
-        backend, return_status = self.nlp.backend, result.return_status
-        if result.iterations >= backend.max_iterations:
-            return Status.ITERATION_LIMIT, where
-        if return_status == "Maximum_WallTime_Exceeded":
-            return Status.TIME_LIMIT, where
-        if return_status == "Diverging_Iterates":
-            return Status.DIVERGED, where or "the cost may be unbounded below"
-        return Status.FAILED, f"{backend.name} says {return_status}. {where}".strip()
-
-    def _infeasible(self, inputs: _Inputs, failed: NlpOutcome, least: LeastViolation) -> NlpOutcome:
-        """Return the least violating trajectory, and what it violates."""
-        message = self._where(least.result, inputs.data, least.violation, least.row)
-        return NlpOutcome((*failed.results, least.result), Status.INFEASIBLE, message)
-
-    def _lost(self, result: NlpResult) -> str:
-        return f"{self.nlp.backend.name} {result.return_status}"
-
-    def _where(
-        self, result: NlpResult, data: RunData, violation: float, row: ConstraintRow | None
-    ) -> str:
-        """Return what is violated, by how much and when."""
-        if row is None:
-            return ""
-        t = self.times(result, data)[row.node]
-        return str(Violation(violation, row, t))
+    def _run(self, nlp: Nlp, inputs: NlpInputs, w: np.ndarray) -> NlpOutcome:
+        """Run a backend from an iterate."""
+        result = nlp.solve(w, inputs.p, inputs.bounds)
+        verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
+        return NlpOutcome((result,), *verdict.judge(inputs, result))
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""
-        duration = self.transcription.duration(result.w)
-        return data.t0 + self.transcription.fractions * duration
+        return self._verdict.times(result, data)
