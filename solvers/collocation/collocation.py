@@ -22,7 +22,8 @@ from solvers.collocation.defects import Defects
 from solvers.collocation.mesh import CollocationGrid, Mesh
 from solvers.direct.first_trajectory import first_duration, other_starts, tame
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
-from solvers.direct.nlp_run import NlpOutcome, NlpRun
+from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_run import NlpRun
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ocp import OCP, Box, InitialGuess
-from solvers.direct.nlp_run import OtherStart
+from solvers.direct.nlp_outcome import OtherStart
 
 # A roll-out explodes where its second half exceeds the first by this factor, beyond what start
 # and bounds suggest: e^(2 lambda T) > 1e4 for a system with the rate lambda.

@@ -18,7 +18,8 @@ from ocp.internal import (
 )
 from solvers.direct.first_trajectory import first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
-from solvers.direct.nlp_run import NlpOutcome, NlpRun
+from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 
 

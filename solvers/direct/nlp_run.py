@@ -10,21 +10,24 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 
-from ocp import Status, Work
+from ocp import Status
 from ocp.internal import RunData, start_violation
 from solvers.direct.curvature_check import has_negative_curvature
 from solvers.direct.feasibility_restoration import FeasibilityRestoration
-from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
 from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved
 
 # A least violation up to this counts as feasible: the elastic problem is solved to its tolerance.
 _FEASIBLE = 1e-5
+# Multipliers beyond this at a violation below that: the constraints' gradients depend on each
+# other.
+_UNBOUNDED, _CLOSE = 1e8, 1e-3
 # A lower cost counts from this on, relative to 1 + abs(cost).
 _LOWER = 1e-6
 # Failures that an infeasible problem may cause. INACCURATE is one of them: to meet a constraint
@@ -42,68 +45,6 @@ _MAYBE_FIRST_ITERATE = (
     Status.DIVERGED,
     Status.FAILED,
 )
-
-
-class OtherStart(NamedTuple):
-    """Another first iterate.
-
-    Attributes:
-        words: what it is, for messages.
-        make: returns the unknowns.
-    """
-
-    words: str
-    make: Callable[[], np.ndarray]
-
-
-@dataclass(frozen=True, eq=False)
-class NlpOutcome:
-    """How the phases so far have ended.
-
-    Attributes:
-        results: of every run of a backend; the last one is returned to the user.
-        status: how it ended.
-        message: what went wrong, and when on the horizon.
-    """
-
-    results: tuple[NlpResult, ...]
-    status: Status
-    message: str
-
-    @property
-    def last(self) -> NlpResult:
-        """The result that counts."""
-        return self.results[-1]
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of all runs."""
-        return sum(result.iterations for result in self.results)
-
-    @property
-    def work(self) -> Work:
-        """Work of all runs."""
-        return sum((result.work for result in self.results), Work())
-
-    def history(self) -> dict[str, np.ndarray]:
-        """Return cost, infeasibility and residual of each iteration of the last run."""
-        names = {"cost": "obj", "infeasibility": "inf_pr", "residual": "inf_du"}
-        return {name: self.last.history(own) for name, own in names.items()}
-
-    @property
-    def residual(self) -> float:
-        """The last dual infeasibility; 0 where the backend records none."""
-        values = self.last.history("inf_du")
-        return float(values[-1]) if values.size else 0.0
-
-    @property
-    def is_undefined(self) -> bool:
-        """Whether a backend met a number that is not finite."""
-        return any(result.is_undefined for result in self.results)
-
-    def after(self, earlier: "NlpOutcome") -> "NlpOutcome":
-        """Return this outcome with the work of an earlier one."""
-        return replace(self, results=(*earlier.results, *self.results))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +66,7 @@ class NlpRun:
     state_error: Callable[[NlpResult, RunData], tuple[float, int]]
     feasibility_restoration: bool = True
 
-    def solve(
-        self, w0: np.ndarray, data: RunData, others: Sequence[OtherStart] = ()
-    ) -> NlpOutcome:
+    def solve(self, w0: np.ndarray, data: RunData, others: Sequence[OtherStart] = ()) -> NlpOutcome:
         """Solve for these data from a first iterate, which is clipped to the bounds.
 
         Args:
@@ -145,14 +84,14 @@ class NlpRun:
 
     # -- the phases ------------------------------------------------------------------------------
 
-    def first_solve(self, inputs: NlpInputs) -> NlpOutcome:
-        """Run the backend from the first iterate, and again where only its scaling was met."""
-        outcome = self._run(self.nlp, inputs, inputs.w0)
+    def first_solve(self, inputs: NlpInputs, nlp: Nlp) -> NlpOutcome:
+        """Run a backend from the first iterate, and again where only its scaling was met."""
+        outcome = self._run(nlp, inputs, inputs.w0)
         if outcome.status is Status.FAILED and outcome.last.success:
-            outcome = self._run(self.nlp, inputs, outcome.last.w).after(outcome)
+            outcome = self._run(nlp, inputs, outcome.last.w).after(outcome)
         return outcome
 
-    def solve_from_perturbed(self, inputs: NlpInputs, first: NlpOutcome) -> NlpOutcome:
+    def solve_from_perturbed(self, inputs: NlpInputs, first: NlpOutcome, nlp: Nlp) -> NlpOutcome:
         """Run the backend from a perturbation of its result.
 
         A backend tests curvature along its steps only: one that makes none accepts a maximum or
@@ -161,25 +100,25 @@ class NlpRun:
         """
         every = np.ones(self.transcription.ocp.model.nu, dtype=bool)
         w = perturbed(self.transcription, inputs, first.last.w, every)
-        second = self._run(self.nlp, inputs, w)
+        second = self._run(nlp, inputs, w)
         if second.last.is_lost:
             message = f"from perturbed controls, {second.message}"
             return NlpOutcome((second.last, *first.results), Status.STATIONARY, message)
-        is_checked = self.nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
-        if is_checked or not has_negative_curvature(self.nlp.function, second.last, inputs):
+        is_checked = nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
+        if is_checked or not has_negative_curvature(nlp.function, second.last, inputs):
             return second.after(first)
         return self._run(self._ipopt, inputs, w).after(second.after(first))
 
     def solve_from_some_perturbed(
-        self, inputs: NlpInputs, first: NlpOutcome, which: np.ndarray
+        self, inputs: NlpInputs, first: NlpOutcome, nlp: Nlp, which: np.ndarray
     ) -> NlpOutcome:
-        """Run the backend from a result with some controls perturbed; keep the better answer.
+        """Run a backend from a result with some controls perturbed; keep the better answer.
 
         Where the derivative in a control vanishes by symmetry no step changes it, at a saddle as
         little as at a minimum.
         """
         w = perturbed(self.transcription, inputs, first.last.w, which)
-        second = self._run(self.nlp, inputs, w)
+        second = self._run(nlp, inputs, w)
         is_lower = second.last.cost < first.last.cost - _LOWER * (1.0 + abs(first.last.cost))
         if second.status.is_success and is_lower:
             return second.after(first)
@@ -190,7 +129,7 @@ class NlpRun:
         names = [n for n, on in zip(self.transcription.ocp.model.u_names, which, strict=True) if on]
         message = (
             f"no minimum: from perturbed {', '.join(names)} the cost falls to "
-            f"{second.last.cost:.6g}, where {self.nlp.backend.name} ended with {second.status.name}"
+            f"{second.last.cost:.6g}, where {nlp.backend.name} ended with {second.status.name}"
         )
         return replace(kept, status=Status.STATIONARY, message=message)
 
@@ -229,16 +168,30 @@ class NlpRun:
 
     # -- when to enter a phase -------------------------------------------------------------------
 
-    def _run_to_an_optimum(self, inputs: NlpInputs) -> NlpOutcome:
+    def _run_to_an_optimum(self, inputs: NlpInputs, nlp: Nlp | None = None) -> NlpOutcome:
         """Run from a first iterate, and from perturbed controls where some did not move."""
-        first, problem = self.first_solve(inputs), self.transcription
+        chosen, problem = nlp or self.nlp, self.transcription
+        first = self.first_solve(inputs, chosen)
+        if nlp is None and self._has_dependent_rows(inputs, first):
+            return self._run_to_an_optimum(inputs, self._for_dependent_rows).after(first)
         if first.status is not Status.SOLVED:
             return first
         still = unmoved(problem, inputs, first.last.w)
         if still.all():
-            return self.solve_from_perturbed(inputs, first)
+            return self.solve_from_perturbed(inputs, first, chosen)
         hidden = still & ~at_bounds(problem, inputs, first.last.w)
-        return self.solve_from_some_perturbed(inputs, first, hidden) if hidden.any() else first
+        if not hidden.any():
+            return first
+        return self.solve_from_some_perturbed(inputs, first, chosen, hidden)
+
+    def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome) -> bool:
+        """Whether IPOPT failed close to the constraints, with multipliers without bound."""
+        if outcome.status not in (Status.FAILED, Status.ITERATION_LIMIT):
+            return False
+        last, is_ipopt = outcome.last, self.nlp.backend.name == "ipopt"
+        violation, _ = self.transcription.worst(last.w, last.g, inputs.bounds)
+        unbounded = np.abs(last.lam_g).max(initial=0.0) > _UNBOUNDED
+        return is_ipopt and bool(unbounded) and violation <= _CLOSE
 
     def _may_be_infeasible(self, outcome: NlpOutcome) -> bool:
         ocp = self.transcription.ocp
@@ -265,10 +218,14 @@ class NlpRun:
         return NlpVerdict(self.transcription, self.nlp, self.accuracy, self.state_error)
 
     @cached_property
+    def _for_dependent_rows(self) -> Nlp:
+        """IPOPT for the same program, with a regularised linear system."""
+        return replace(self.nlp.backend, dependent_rows=True).build(self.transcription)
+
+    @cached_property
     def _ipopt(self) -> Nlp:
         """IPOPT for the same program, built where fatrop's answer may be a saddle."""
-        backend: NlpBackend = replace(self.nlp.backend, name="ipopt")
-        return backend.build(self.transcription)
+        return replace(self.nlp.backend, name="ipopt").build(self.transcription)
 
     def _inputs(self, w0: np.ndarray, data: RunData) -> NlpInputs:
         bounds = self.transcription.bounds(data)
@@ -279,7 +236,8 @@ class NlpRun:
         """Run a backend from an iterate."""
         result = nlp.solve(w, inputs.p, inputs.bounds)
         verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
-        return NlpOutcome((result,), *verdict.judge(inputs, result))
+        judged = verdict.judge(inputs, result)
+        return NlpOutcome((judged.result,), judged.status, judged.message)
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""

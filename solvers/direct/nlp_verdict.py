@@ -1,13 +1,15 @@
 """Status and message of what a backend returned, judged by the answer and not by its word."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ocp import Status
 from ocp.internal import ConstraintRow, RunData, Violation, start_violation
+from solvers.direct.fitted_multipliers import with_fitted_multipliers
 from solvers.direct.nlp_backends import Nlp, NlpResult
 from solvers.direct.optimality_residual import OptimalityCheck
 from solvers.direct.return_words import ACCEPTABLE, meaning
@@ -16,7 +18,7 @@ from solvers.direct.transcribed_problem import TranscribedProblem
 # Constraint violations above this count, also if the backend accepts them after scaling.
 _VIOLATED = 1e-6
 # Where a backend has not met its tolerance, residuals below this are accepted, and reported.
-_ACCEPTABLE = 1e-6
+_ACCEPTABLE = 5e-4
 # A success with a residual above this was one only after the backend's scaling.
 _NOT_STATIONARY = 1e-4
 
@@ -31,13 +33,21 @@ class NlpInputs:
     data: RunData
 
 
+class JudgedResult(NamedTuple):
+    """A result with what it is worth."""
+
+    result: NlpResult
+    status: Status
+    message: str
+
+
 @dataclass(frozen=True, eq=False)
 class NlpVerdict:
     """Judges results of a backend.
 
     A result counts as an optimum where constraints and first-order conditions hold without the
     backend's scaling. Where the backend stopped before its tolerance was met, a residual up to
-    1e-6, relative to multipliers and cost, is accepted, and the message reports it.
+    5e-4 is accepted, see ``with_fitted_multipliers``, and the message reports it.
 
     Attributes:
         transcription: the problem on its grid.
@@ -51,27 +61,38 @@ class NlpVerdict:
     accuracy: float
     state_error: Callable[[NlpResult, RunData], tuple[float, int]]
 
-    def judge(self, inputs: NlpInputs, result: NlpResult) -> tuple[Status, str]:
-        """Return status and message."""
-        name, word = self.nlp.backend.name, meaning(self.nlp.backend.name, result.return_status)
+    def judge(self, inputs: NlpInputs, result: NlpResult) -> JudgedResult:
+        """Return the result, with multipliers of its own where it is accepted, and its status."""
+        backend = self.nlp.backend
         if result.is_lost:
-            return Status.FAILED, f"{name} {result.return_status}"
+            return JudgedResult(result, Status.FAILED, f"{backend.name} {result.return_status}")
         if not np.isfinite(result.cost):
-            return Status.DIVERGED, f"{name} met a number that is not finite: {word.sentence}"
+            said = meaning(backend.name, result.return_status).sentence
+            message = f"{backend.name} met a number that is not finite: {said}"
+            return JudgedResult(result, Status.DIVERGED, message)
         violation, row = self.transcription.worst(result.w, result.g, inputs.bounds)
         if violation > _VIOLATED:
             where = self.where(result, inputs.data, violation, row)
-            return self._judge_failure(result, where)
-        residual = self._check(result, inputs.p, inputs.bounds)
-        if result.success and result.return_status != ACCEPTABLE:
-            if residual.is_stationary(_NOT_STATIONARY):
-                return self._judge_solution(inputs, result, "")
-            said = f"{residual.gradient:.2g}, with multipliers up to {residual.multiplier:.2g}"
-            return Status.FAILED, f"no optimum: the gradient of the Lagrangian is {said}"
-        if residual.relative <= _ACCEPTABLE:
-            said = f"to an acceptable level: residual {residual.relative:.1g}"
-            return self._judge_solution(inputs, result, said)
-        return self._judge_failure(result, "")
+            return JudgedResult(result, *self._judge_failure(result, where))
+        if not result.success or result.return_status == ACCEPTABLE:
+            return self._judge_unfinished(inputs, result)
+        residual = self._residual(result, inputs.p, inputs.bounds)
+        if residual.is_stationary(_NOT_STATIONARY):
+            return JudgedResult(result, *self._judge_solution(inputs, result, ""))
+        said = f"{residual.gradient:.2g}, with multipliers up to {residual.multiplier:.2g}"
+        message = f"no optimum: the gradient of the Lagrangian is {said}"
+        return JudgedResult(result, Status.FAILED, message)
+
+    def _judge_unfinished(self, inputs: NlpInputs, result: NlpResult) -> JudgedResult:
+        """Accept a result that meets the constraints but not the backend's tolerance, or not."""
+        is_control = self.transcription.is_control
+        fitted = with_fitted_multipliers(
+            self.nlp.function, result, inputs.p, inputs.bounds, is_control
+        )
+        if fitted.residual is None or fitted.residual > _ACCEPTABLE:
+            return JudgedResult(result, *self._judge_failure(result, ""))
+        said = f"to an acceptable level: residual {fitted.residual:.1g}"
+        return JudgedResult(fitted, *self._judge_solution(inputs, fitted, said))
 
     def _judge_solution(
         self, inputs: NlpInputs, result: NlpResult, level: str
@@ -113,5 +134,5 @@ class NlpVerdict:
         return data.t0 + self.transcription.fractions * duration
 
     @cached_property
-    def _check(self) -> OptimalityCheck:
+    def _residual(self) -> OptimalityCheck:
         return OptimalityCheck(self.nlp.function)

@@ -22,7 +22,9 @@ _SINGULAR = "its linear system is singular or its derivatives are wrong"
 
 _WORDS: dict[tuple[str, str], ReturnWord] = {
     ("ipopt", "Solve_Succeeded"): ReturnWord(Status.SOLVED, ""),
-    ("ipopt", ACCEPTABLE): ReturnWord(Status.SOLVED, ""),
+    ("ipopt", ACCEPTABLE): ReturnWord(
+        Status.FAILED, "it stopped at a point that is acceptable only after its own scaling"
+    ),
     ("ipopt", "Infeasible_Problem_Detected"): ReturnWord(
         Status.FAILED, "it converged to a point where the constraints' violation is least, not zero"
     ),
