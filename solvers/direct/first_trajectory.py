@@ -61,7 +61,7 @@ def other_starts(
     """
     has_states = guess is not None and guess.sample("x", np.zeros(1), ocp.model.nx) is not None
     if not has_states:
-        yield OtherStart("the start held", lambda: make(duration, True))
+        yield OtherStart(None, lambda: make(duration, True))
     if not ocp.has_free_time:
         return
     shortest, longest = (float(np.asarray(b)[0]) for b in (ocp.time_box.lower, ocp.time_box.upper))
@@ -71,4 +71,4 @@ def other_starts(
         if other in tried:
             continue
         tried.append(other)
-        yield OtherStart(f"a final time of {other:.4g} s", lambda other=other: make(other, False))
+        yield OtherStart(other, lambda other=other: make(other, False))

@@ -140,7 +140,7 @@ class NlpRun:
             return failed
         found = replace(failed, results=(*failed.results, least.result))
         if least.violation <= _FEASIBLE:
-            return self._run(self.nlp, inputs, least.result.w).after(found)
+            return self._run_to_an_optimum(replace(inputs, w0=least.result.w)).after(found)
         message = self._verdict.where(least.result, inputs.data, least.violation, least.row)
         return replace(found, status=Status.INFEASIBLE, message=message)
 
@@ -148,23 +148,23 @@ class NlpRun:
         self, failed: NlpOutcome, others: Sequence[OtherStart], data: RunData, started: float
     ) -> NlpOutcome:
         """Solve from other first iterates, until one succeeds or the time limit has passed."""
-        tried: list[str] = []
+        tried: list[OtherStart] = []
         results = failed.results
         for other in others:
             if perf_counter() - started > self.nlp.backend.time_limit:
                 break
             outcome = self._run_to_an_optimum(self._inputs(other.make(), data))
-            tried.append(other.words)
+            tried.append(other)
             if outcome.status.is_success:
-                said = f"from {other.words}; from the first guess: {failed.status.name}"
+                said = f"from {other}; from the first iterate: {failed.status.name}"
                 message = "; ".join(part for part in (outcome.message, said) if part)
                 results = (*results, *outcome.results)
                 return NlpOutcome(results, outcome.status, message)
             results = (*outcome.results, *results)
-        if not tried:
-            return failed
-        said = f"{failed.message}; nor from {', '.join(tried)}"
-        return NlpOutcome(results, failed.status, said)
+        times = ", ".join(f"{other.duration:.4g} s" for other in tried if other.duration)
+        said = f"guesses of the final time of {times} lead nowhere either" if times else ""
+        message = "; ".join(part for part in (failed.message, said) if part)
+        return NlpOutcome(results, failed.status, message)
 
     # -- when to enter a phase -------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """Status and message of what a backend returned, judged by the answer and not by its word."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,6 +21,8 @@ _VIOLATED = 1e-6
 _ACCEPTABLE = 5e-4
 # A success with a residual above this was one only after the backend's scaling.
 _NOT_STATIONARY = 1e-4
+# Unknowns beyond this have diverged.
+_DIVERGED = 1e15
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,7 @@ class NlpVerdict:
             return Status.ITERATION_LIMIT, where
         if word.status is Status.TIME_LIMIT:
             return Status.TIME_LIMIT, where
-        if word.status is Status.DIVERGED:
+        if word.status is Status.DIVERGED or np.abs(result.w).max() > _DIVERGED:
             return Status.DIVERGED, where or "the cost may be unbounded below"
         said = f"{backend.name}: {word.sentence}" if word.sentence else ""
         return Status.FAILED, "; ".join(part for part in (said, where) if part)
