@@ -1,6 +1,7 @@
 """Where a direct method starts: a roll-out that stays tame, and what is tried if it fails."""
 
 from collections.abc import Callable, Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -16,25 +17,43 @@ _SMALL = 0.01
 _MULTIPLES = (4.0, 16.0, 64.0, 0.25)
 
 
-def tame(x: np.ndarray, x0: np.ndarray, box: Box) -> np.ndarray:
-    """Return a roll-out (N + 1, nx), or x0 at all nodes where it explodes or is not finite.
+# Where a first iterate without states gets them from: the start held, the roll-out as it is, or
+# the roll-out if it is tame, else the start held.
+FirstStates = Literal["tame", "held", "rolled out"]
+# What is tried where the tame one leads nowhere.
+OTHER_STATES: tuple[FirstStates, ...] = ("held", "rolled out")
+
+
+def first_states(
+    x0: np.ndarray, nodes: int, box: Box, rollout: Callable[[], np.ndarray], source: FirstStates
+) -> np.ndarray:
+    """Return the states of a first iterate whose guess has none, (N + 1, nx); they are finite.
 
     An unstable system left to itself ends at any size. As a first iterate that is worse than no
     motion at all: it sets the scaling of a backend, and its derivatives are of no use.
 
     Args:
-        x: states of the roll-out.
         x0: start (nx,).
+        nodes: number of nodes.
         box: bounds of the states.
+        rollout: returns the states under the controls of the guess.
+        source: see ``FirstStates``.
     """
-    held = np.tile(x0, (len(x), 1))
-    if not np.isfinite(x).all():
+    held = np.tile(x0, (nodes, 1))
+    if source == "held":
         return held
+    x = rollout()
+    if not np.isfinite(x).all() or (source == "tame" and _explodes(x, box)):
+        return held
+    return x
+
+
+def _explodes(x: np.ndarray, box: Box) -> bool:
     bounds = np.abs(np.vstack([np.asarray(box.lower), np.asarray(box.upper)], dtype=float))
     first = np.abs(x[: len(x) // 2 + 1]).max(axis=0)
     usual = np.maximum(first, np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0))
     usual = np.maximum(usual, _SMALL * usual.max())
-    return held if (np.abs(x).max(axis=0) > _EXPLODES * usual).any() and usual.max() else x
+    return bool((np.abs(x).max(axis=0) > _EXPLODES * usual).any() and usual.max() > 0.0)
 
 
 def first_duration(ocp: OCP, guess: InitialGuess | None) -> float:
@@ -46,22 +65,25 @@ def other_starts(
     ocp: OCP,
     guess: InitialGuess | None,
     duration: float,
-    make: Callable[[float, bool], np.ndarray],
+    make: Callable[[float, FirstStates], np.ndarray],
 ) -> Iterator[OtherStart]:
     """Yield first iterates to try where the first one leads nowhere.
 
-    Without states in the guess: the start held. With a free final time: other final times, longer
-    ones first.
+    Without states in the guess: the start held, and the roll-out if that was refused. With a free
+    final time: other final times, longer ones first.
 
     Args:
         ocp: the problem.
         guess: of the run.
         duration: of the first iterate [s].
-        make: (duration, whether the start is held) -> unknowns.
+        make: (duration, where the states come from) -> unknowns.
     """
     has_states = guess is not None and guess.sample("x", np.zeros(1), ocp.model.nx) is not None
     if not has_states:
-        yield OtherStart(None, lambda: make(duration, True))
+        for source in OTHER_STATES:
+            yield OtherStart(
+                f"the start {source}", None, lambda source=source: make(duration, source)
+            )
     if not ocp.has_free_time:
         return
     shortest, longest = (float(np.asarray(b)[0]) for b in (ocp.time_box.lower, ocp.time_box.upper))
@@ -71,4 +93,5 @@ def other_starts(
         if other in tried:
             continue
         tried.append(other)
-        yield OtherStart(other, lambda other=other: make(other, False))
+        said = f"a guess of the final time of {other:.4g} s"
+        yield OtherStart(said, other, lambda other=other: make(other, "tame"))

@@ -16,7 +16,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
-from solvers.direct.first_trajectory import first_duration, other_starts
+from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_outcome import NlpOutcome
 from solvers.direct.nlp_run import NlpRun
@@ -112,10 +112,10 @@ class MultipleShootingProgram(MethodProgram):
         """Solve for these data, in the phases of ``NlpRun``."""
         ocp, duration = self.ocp, first_duration(self.ocp, guess)
 
-        def first(duration: float, held: bool) -> np.ndarray:
-            return self.transcription.join(*self._iterate(data, guess, duration, held=held))
+        def first(duration: float, source: FirstStates) -> np.ndarray:
+            return self.transcription.join(*self._iterate(data, guess, duration, source))
 
-        w0, others = first(duration, False), tuple(other_starts(ocp, guess, duration, first))
+        w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
         run = self._nlp_run
         outcome = run.solve(w0, data, others)
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
@@ -147,12 +147,12 @@ class MultipleShootingProgram(MethodProgram):
         self, data: RunData, guess: InitialGuess | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states and controls of the guess, a free final time with the states."""
-        return self._iterate(data, guess, first_duration(self.ocp, guess), held=False)
+        return self._iterate(data, guess, first_duration(self.ocp, guess), "tame")
 
     def _iterate(
-        self, data: RunData, guess: InitialGuess | None, duration: float, *, held: bool
+        self, data: RunData, guess: InitialGuess | None, duration: float, source: FirstStates
     ) -> tuple[np.ndarray, np.ndarray]:
-        x, u = self.grid.first_iterate(data, guess, duration, held=held)
+        x, u = self.grid.first_iterate(data, guess, duration, source)
         time = np.full((len(x), int(self.ocp.has_free_time)), duration)
         return np.hstack([x, time]), u
 

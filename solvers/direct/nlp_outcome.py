@@ -14,18 +14,14 @@ class OtherStart(NamedTuple):
     """Another first iterate.
 
     Attributes:
-        duration: its final time minus t0, where that was changed [s]; None: the start held.
+        words: what it is, for messages.
+        duration: its final time minus t0, where that was changed [s].
         make: returns the unknowns.
     """
 
+    words: str
     duration: float | None
     make: Callable[[], np.ndarray]
-
-    def __str__(self) -> str:
-        """Return what it is, for messages."""
-        if self.duration is None:
-            return "the start held"
-        return f"a guess of the final time of {self.duration:.4g} s"
 
 
 @dataclass(frozen=True, eq=False)

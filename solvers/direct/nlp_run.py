@@ -79,7 +79,7 @@ class NlpRun:
         if self._may_be_infeasible(outcome):
             outcome = self.restore_feasibility(inputs, outcome)
         if self._may_start_elsewhere(outcome, data):
-            outcome = self.solve_from_others(outcome, others, data, started)
+            outcome = self.solve_from_others(inputs, outcome, others, started)
         return outcome
 
     # -- the phases ------------------------------------------------------------------------------
@@ -145,18 +145,25 @@ class NlpRun:
         return replace(found, status=Status.INFEASIBLE, message=message)
 
     def solve_from_others(
-        self, failed: NlpOutcome, others: Sequence[OtherStart], data: RunData, started: float
+        self, first: NlpInputs, failed: NlpOutcome, others: Sequence[OtherStart], started: float
     ) -> NlpOutcome:
         """Solve from other first iterates, until one succeeds or the time limit has passed."""
         tried: list[OtherStart] = []
-        results = failed.results
+        begun, results = [first.w0], failed.results
         for other in others:
             if perf_counter() - started > self.nlp.backend.time_limit:
                 break
-            outcome = self._run_to_an_optimum(self._inputs(other.make(), data))
+            inputs = self._inputs(other.make(), first.data)
+            if any(np.array_equal(inputs.w0, earlier) for earlier in begun):
+                continue
+            outcome = self._run_to_an_optimum(inputs)
             tried.append(other)
-            if outcome.status.is_success:
-                said = f"from {other}; from the first iterate: {failed.status.name}"
+            begun.append(inputs.w0)
+            is_better = outcome.status.is_success or (
+                failed.status is Status.DIVERGED and outcome.status is Status.INACCURATE
+            )
+            if is_better:
+                said = f"from {other.words}; from the first iterate: {failed.status.name}"
                 message = "; ".join(part for part in (outcome.message, said) if part)
                 results = (*results, *outcome.results)
                 return NlpOutcome(results, outcome.status, message)
