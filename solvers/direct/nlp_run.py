@@ -163,8 +163,10 @@ class NlpRun:
                 failed.status is Status.DIVERGED and outcome.status is Status.INACCURATE
             )
             if is_better:
-                said = f"from {other.words}; from the first iterate: {failed.status.name}"
-                message = "; ".join(part for part in (outcome.message, said) if part)
+                message = outcome.message
+                if outcome.status.is_success:
+                    said = f"from {other.words}; from the first iterate: {failed.status.name}"
+                    message = f"{message}; {said}" if message else said
                 results = (*results, *outcome.results)
                 return NlpOutcome(results, outcome.status, message)
             results = (*outcome.results, *results)

@@ -228,7 +228,7 @@ def test_a_coarse_integrator_is_inaccurate(solver: Solver) -> None:
     """RK4 with h = 1/20 is unstable on dx/dt = -100 x."""
     solution = solve(moving(lambda x, u: -100 * x + u, x0=1.0), solver)
     assert solution.status is Status.INACCURATE
-    assert re.match(r"a state moves by \S+ at t = \S+ s", solution.message)
+    assert re.fullmatch(r"a state moves by \S+ at t = \S+ s", solution.message)
 
 
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
