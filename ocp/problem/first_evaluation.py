@@ -21,12 +21,12 @@ class _Problem(Protocol):
 
     @property
     def running_cost(self) -> ca.SX | float:
-        """L."""
+        """The cost per time."""
         ...
 
     @property
     def terminal_cost(self) -> ca.SX | float:
-        """phi."""
+        """The cost at the end."""
         ...
 
     @property
@@ -43,12 +43,11 @@ class _Problem(Protocol):
 def inside(box: Box) -> np.ndarray:
     """Return controls within their bounds, not on them: the middle, 1 off a single bound, or 0."""
     lower, upper = np.asarray(box.lower, dtype=float), np.asarray(box.upper, dtype=float)
-    below, above = np.where(np.isfinite([lower, upper]), [lower, upper], 0.0)
-    middle = np.where(np.isfinite(lower) & np.isfinite(upper), (below + above) / 2.0, 0.0)
-    middle = np.where(
-        np.isfinite(lower) & ~np.isfinite(upper), np.maximum(below + 1.0, 0.0), middle
-    )
-    return np.where(~np.isfinite(lower) & np.isfinite(upper), np.minimum(above - 1.0, 0.0), middle)
+    is_below, is_above = np.isfinite(lower), np.isfinite(upper)
+    below, above = np.where(is_below, lower, 0.0), np.where(is_above, upper, 0.0)
+    one_sided = np.where(is_below, np.maximum(below + 1.0, 0.0), np.minimum(above - 1.0, 0.0))
+    one_sided = np.where(is_below | is_above, one_sided, 0.0)
+    return np.where(is_below & is_above, (below + above) / 2.0, one_sided)
 
 
 def fault_at(ocp: _Problem, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> str:
@@ -71,5 +70,5 @@ def fault_at(ocp: _Problem, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> str:
         rows = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
         if rows.size:
             said = readable(ca.vertsplit(ca.densify(ca.SX(expression)))[int(rows[0])])
-            return f"{what} (row {rows[0]}: {said}) is not finite at x0 = {x}, u = {u}"
+            return f"{what} (row {rows[0]}) is not finite at x0 = {x}, u = {u}: {said}"
     return ""

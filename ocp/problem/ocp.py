@@ -15,10 +15,10 @@ from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_s
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
 from ocp.problem.describe import describe
+from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
-from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.parameters import Parameter, ParameterValues, Signal
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
@@ -307,7 +307,7 @@ class OCP:
         p = self.parameter_values().at(0.0)[0]
         faults = [fault_at(self, x0, u, p) for u in self._first_controls()]
         if all(faults):
-            raise ProblemError(f"{self.name}: {faults[0]}: a singular start, or NaN in the data")
+            raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")
 
     def _first_controls(self) -> list[np.ndarray]:
         """Return the controls with which solvers may start: of the guess or the bounds, and 0."""
