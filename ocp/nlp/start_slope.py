@@ -44,8 +44,12 @@ def step_with_fixed_start(function: ca.Function, n: int, x0: ca.MX, inputs: list
     """
     flags = [name != "x" for name in function.name_in()]
     # Of SX, the zero seeds of the start are dropped; in MX they would multiply its slopes.
-    s = function.sx_in() if function.is_a("SXFunction") else function.mx_in()
-    first = ca.Function("first_stage", s, function.call(s), {"is_diff_in": flags})
+    if function.is_a("SXFunction"):
+        sx = function.sx_in()
+        first = ca.Function("first_stage", sx, function.call(sx), {"is_diff_in": flags})
+    else:
+        mx = function.mx_in()
+        first = ca.Function("first_stage", mx, function.call(mx), {"is_diff_in": flags})
     values = first.call([x0, *(entry[:, 0] for entry in inputs[1:])])
     # With structural zeros a backend that detects the stages would not find x_0.
     values = [v + ca.MX(ca.DM.zeros(v.numel(), x0.numel())) @ inputs[0][:, 0] for v in values]

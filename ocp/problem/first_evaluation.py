@@ -1,5 +1,6 @@
 """What of a problem is not finite where it starts."""
 
+from functools import cached_property
 from typing import Protocol
 
 import casadi as ca
@@ -34,7 +35,7 @@ class _Problem(Protocol):
         """Of all places."""
         ...
 
-    @property
+    @cached_property
     def functions(self) -> Functions:
         """The same as Functions."""
         ...

@@ -1,6 +1,7 @@
 """Where a direct method starts: a roll-out that stays tame, and what is tried if it fails."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -81,9 +82,7 @@ def other_starts(
     has_states = guess is not None and guess.sample("x", np.zeros(1), ocp.model.nx) is not None
     if not has_states:
         for source in OTHER_STATES:
-            yield OtherStart(
-                f"the start {source}", None, lambda source=source: make(duration, source)
-            )
+            yield OtherStart(f"the start {source}", None, partial(make, duration, source))
     if not ocp.has_free_time:
         return
     shortest, longest = (float(np.asarray(b)[0]) for b in (ocp.time_box.lower, ocp.time_box.upper))
@@ -94,4 +93,4 @@ def other_starts(
             continue
         tried.append(other)
         said = f"a guess of the final time of {other:.4g} s"
-        yield OtherStart(said, other, lambda other=other: make(other, "tame"))
+        yield OtherStart(said, other, partial(make, other, "tame"))

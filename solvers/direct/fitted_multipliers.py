@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from scipy.sparse import bmat, csc_matrix, eye, vstack
+from scipy.sparse import bmat, csc_matrix, csr_matrix, eye, vstack
 from scipy.sparse.linalg import splu
 
 from solvers.direct.nlp_backends import NlpResult
@@ -50,7 +50,7 @@ def with_fitted_multipliers(
     slopes = csc_matrix(function.get_function("nlp_jac_g")(x=w, p=p)["jac_g_x"].sparse())
     if not (np.isfinite(gradient).all() and np.isfinite(slopes.data).all()):
         return replace(result, residual=np.inf)
-    rows = vstack([slopes, eye(size)], format="csr")
+    rows = csr_matrix(vstack([slopes, eye(size)]))
     values = np.concatenate([result.g, w])
     lower = np.concatenate([bounds["lbg"], bounds["lbx"]])
     upper = np.concatenate([bounds["ubg"], bounds["ubx"]])
@@ -60,14 +60,14 @@ def with_fitted_multipliers(
     for _ in range(_ROUNDS):
         chosen = np.flatnonzero(active)
         fitted[:] = 0.0
-        fitted[chosen] = _fit(rows[chosen], -gradient)
+        fitted[chosen] = _fit(csr_matrix(rows[chosen]), -gradient)
         wrong = ((fitted > 0.0) & ~at_upper) | ((fitted < 0.0) & ~at_lower)
+        fitted[wrong] = 0.0
         if not wrong.any():
             break
         active &= ~wrong
-    fitted[wrong] = 0.0
     left = np.abs(gradient + rows.T @ fitted)
-    terms = np.abs(gradient) + np.abs(rows).T @ np.abs(fitted)
+    terms = np.abs(gradient) + abs(rows).T @ np.abs(fitted)
     distance = np.where(fitted > 0.0, upper - values, values - lower)
     gap = np.abs(fitted[active] * distance[active]).sum()
     residual = max(
@@ -78,10 +78,12 @@ def with_fitted_multipliers(
     return replace(result, lam_g=fitted[:count], lam_x=fitted[count:], residual=residual)
 
 
-def _fit(rows: csc_matrix, wanted: np.ndarray) -> np.ndarray:
+def _fit(rows: csr_matrix, wanted: np.ndarray) -> np.ndarray:
     """Return the multipliers of rows whose combination is nearest to a gradient."""
-    count, size = rows.shape
-    system = bmat([[eye(size), rows.T], [rows, -_SMALLEST * eye(count)]], format="csc")
+    size = len(wanted)
+    count = int(rows.indptr.size) - 1
+    blocks = [[eye(size), rows.T], [rows, -_SMALLEST * eye(count)]]
+    system = csc_matrix(bmat(blocks))
     return splu(system).solve(np.concatenate([wanted, np.zeros(count)]))[size:]
 
 

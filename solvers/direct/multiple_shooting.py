@@ -116,12 +116,11 @@ class MultipleShootingProgram(MethodProgram):
             return self.transcription.join(*self._iterate(data, guess, duration, source))
 
         w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
-        run = self._nlp_run
-        outcome = run.solve(w0, data, others)
+        outcome = self._nlp_run.solve(w0, data, others)
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
-            run = self._nlp_run_without_slope
-            outcome = run.solve(w0, data, others).after(outcome)
-        return self._result(data, outcome, run)
+            outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
+            return self._result(data, outcome, self._without_slope)
+        return self._result(data, outcome, self.transcription)
 
     @cached_property
     def _nlp_run(self) -> NlpRun:
@@ -135,11 +134,14 @@ class MultipleShootingProgram(MethodProgram):
         )
 
     @cached_property
-    def _nlp_run_without_slope(self) -> NlpRun:
+    def _without_slope(self) -> Transcription:
         """For a fixed start at which a slope is not finite: nothing is differentiated there."""
-        transcription = replace(self.transcription, start_as_data=True, compiled=False)
-        nlp = self.solver.nlp_backend.build(transcription)
-        return replace(self._nlp_run, transcription=transcription, nlp=nlp)
+        return replace(self.transcription, start_as_data=True, compiled=False)
+
+    @cached_property
+    def _nlp_run_without_slope(self) -> NlpRun:
+        nlp = self.solver.nlp_backend.build(self._without_slope)
+        return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
 
     # -- the first iterate -------------------------------------------------------------------
 
@@ -165,14 +167,14 @@ class MultipleShootingProgram(MethodProgram):
         schedule = self.grid.schedule(data, tr.duration(result.w))
         return self.grid.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _result(self, data: RunData, outcome: NlpOutcome, run: NlpRun) -> RunResult:
+    def _result(self, data: RunData, outcome: NlpOutcome, tr: Transcription) -> RunResult:
         """The last result, with the work of all runs."""
-        tr, result = run.transcription, outcome.last
+        result = outcome.last
         z, u = tr.split(result.w)
         return RunResult(
             status=outcome.status,
             message=outcome.message,
-            t=run.times(result, data),
+            t=self._nlp_run.times(result, data),
             x=z[:, : tr.ocp.model.nx],
             costate=tr.costates(result.w, result.lam_x, result.lam_g, data),
             u=u,

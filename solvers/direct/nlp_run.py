@@ -101,9 +101,12 @@ class NlpRun:
         every = np.ones(self.transcription.ocp.model.nu, dtype=bool)
         w = perturbed(self.transcription, inputs, first.last.w, every)
         second = self._run(nlp, inputs, w)
-        if second.last.is_lost:
+        is_unknown = second.status is Status.FAILED and not self._is_lower(inputs, second, first)
+        if is_unknown and nlp.backend.name == "ipopt" and not nlp.backend.dependent_rows:
+            return self.solve_from_perturbed(inputs, first, self._for_dependent_rows)
+        if second.last.is_lost or is_unknown:
             message = f"from perturbed controls, {second.message}"
-            return NlpOutcome((second.last, *first.results), Status.STATIONARY, message)
+            return replace(first.after(second), status=Status.STATIONARY, message=message)
         is_checked = nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
         if is_checked or not has_negative_curvature(nlp.function, second.last, inputs):
             return second.after(first)
@@ -119,12 +122,11 @@ class NlpRun:
         """
         w = perturbed(self.transcription, inputs, first.last.w, which)
         second = self._run(nlp, inputs, w)
-        is_lower = second.last.cost < first.last.cost - _LOWER * (1.0 + abs(first.last.cost))
+        is_lower = self._is_lower(inputs, second, first)
         if second.status.is_success and is_lower:
             return second.after(first)
-        violation, _ = self.transcription.worst(second.last.w, second.last.g, inputs.bounds)
         kept = first.after(second)
-        if violation > _FEASIBLE or not is_lower:
+        if not is_lower:
             return kept
         names = [n for n, on in zip(self.transcription.ocp.model.u_names, which, strict=True) if on]
         message = (
@@ -201,6 +203,13 @@ class NlpRun:
         violation, _ = self.transcription.worst(last.w, last.g, inputs.bounds)
         unbounded = np.abs(last.lam_g).max(initial=0.0) > _UNBOUNDED
         return is_ipopt and bool(unbounded) and violation <= _CLOSE
+
+    def _is_lower(self, inputs: NlpInputs, second: NlpOutcome, first: NlpOutcome) -> bool:
+        """Whether the constraints still hold and the cost has fallen."""
+        before, after = first.last, second.last
+        violation, _ = self.transcription.worst(after.w, after.g, inputs.bounds)
+        has_fallen = after.cost < before.cost - _LOWER * (1.0 + abs(before.cost))
+        return violation <= _FEASIBLE and has_fallen
 
     def _may_be_infeasible(self, outcome: NlpOutcome) -> bool:
         ocp = self.transcription.ocp

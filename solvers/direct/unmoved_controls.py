@@ -14,7 +14,8 @@ _UNCHANGED = 1e-6
 def unmoved(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> np.ndarray:
     """Return which controls are those of the first iterate all along the horizon, bool (nu,)."""
     before, after = (_controls(problem, each) for each in (inputs.w0, w))
-    return (np.abs(after - before) <= _UNCHANGED * (1.0 + np.abs(before))).all(axis=0)
+    changed = np.abs(after - before) > _UNCHANGED * (1.0 + np.abs(before))
+    return ~np.asarray(changed.any(axis=0))
 
 
 def at_bounds(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> np.ndarray:
@@ -23,7 +24,8 @@ def at_bounds(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> 
         _controls(problem, each) for each in (w, inputs.bounds["lbx"], inputs.bounds["ubx"])
     )
     near = _UNCHANGED * (1.0 + np.abs(u))
-    return ((u - lower <= near) | (upper - u <= near)).all(axis=0)
+    inside = (u - lower > near) & (upper - u > near)
+    return ~np.asarray(inside.any(axis=0))
 
 
 def perturbed(
