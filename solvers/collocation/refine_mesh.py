@@ -91,7 +91,7 @@ def refine_mesh(
     Args:
         start: a solution of any solver: the problem, its data, and the first guess.
         solver: points, options, and the first mesh; default ``Collocation(intervals=10)``.
-        accuracy: accepted error of an interval, see ``Round``.
+        accuracy: accepted error of an interval, see ``MeshRound``.
         rounds: meshes at most; ``INACCURATE`` if the last is still not fine enough.
 
     Returns:

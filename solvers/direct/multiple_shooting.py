@@ -27,6 +27,10 @@ from solvers.direct.shooting_grid import ShootingGrid
 class MultipleShooting(Solver):
     """The direct baseline, for every kind of problem that can be described.
 
+    Without states in the guess it starts from the roll-out of the controls, or from the start held
+    where that explodes. ``SOLVED`` is said by the unscaled optimality conditions; where the backend
+    stopped before its tolerance, a residual up to 5e-4 is accepted, and the message gives it.
+
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
 
     Args:
@@ -40,15 +44,16 @@ class MultipleShooting(Solver):
             interval is halved; a solution beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
-        time_limit: for each run of the backend, of which a solve may take three [s]; inf:
+        time_limit: for each run of the backend, of which a solve may take some [s]: other first
+            iterates are not tried once it has passed; inf:
             unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT returns its iterate,
             ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; with a
             limit it runs in a process of its own, and a process that is ended returns no iterate:
             ``FAILED``.
         feasibility_restoration: after a failure, find the trajectory that violates the
             constraints least: it tells whether the problem is infeasible, and is a better first
-            iterate if it is not. It may cost 300 iterations; turn it off in a controller with a
-            deadline.
+            iterate if it is not; after that, try other first iterates. Each may cost 300
+            iterations; turn it off in a controller with a deadline.
     """
 
     intervals: int = 75
