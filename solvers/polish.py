@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from ocp import Solution, Status, UnsupportedProblem, Work
+from ocp import Solution, Status, UnsupportedProblem, Work, evaluate
 from ocp.internal import (
     ACCURACY,
     check_instance,
@@ -12,6 +12,7 @@ from ocp.internal import (
     judged,
     scaled,
 )
+from solvers.constrained.inactive_bounds import without_inactive
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
 from solvers.indirect.step_halving import change_when_halved, finer
@@ -24,6 +25,8 @@ _FINER = 4
 _MOST_INTERVALS = 600
 # The cost is flat about an optimum: where it holds to some accuracy, states may move by more.
 _STATE = 100.0
+# Larger violations of what was left out count.
+_VIOLATED = 1e-6
 
 
 def polish(
@@ -37,6 +40,9 @@ def polish(
     ``SOLVED`` if the second-order test passes (no conjugate point), and stays ``STATIONARY``,
     with the reason as its message, if not.
 
+    State bounds, path and terminal inequalities that act nowhere along the given solution are left
+    out; the result is checked against them by the referee, and its message names them.
+
     Args:
         solution: of any method that returns costates, near an extremal.
         solver: segments, first number of steps, tolerance; default 15 segments, 300 steps.
@@ -48,8 +54,8 @@ def polish(
 
     Raises:
         ProblemError: if an argument is of another kind, or the accuracy not positive.
-        UnsupportedProblem: if the minimum principle does not apply (path constraints, state
-            bounds, a Hamiltonian linear in the control, a cost with kinks).
+        UnsupportedProblem: if the minimum principle does not apply (path constraints or state
+            bounds that act, a Hamiltonian linear in the control, a cost with kinks).
     """
     check_positive(accuracy, "polish: accuracy")
     check_instance(solution, Solution, "polish: solution")
@@ -63,8 +69,25 @@ def polish(
     if (own := scaled(ocp)) is not None:
         polished = polish(in_own_units(solution, own), accuracy=accuracy, solver=solver)
         return in_original_units(polished, own)
+    reduced = without_inactive(solution)
+    if reduced is None:
+        return _polished(solution, solver, accuracy)
+    free = solution.with_(problem=reduced.ocp)
+    result = _polished(free, solver, accuracy).with_(problem=ocp)
+    violation = evaluate(result).violation
+    if result.status.is_success and violation > _VIOLATED:
+        raise UnsupportedProblem(
+            f"{ocp.name}: without {reduced.dropped} the extremal violates them by {violation:.2g}: "
+            "they act, and no polish applies"
+        )
+    said = f"polished without {reduced.dropped}, which do not act"
+    return result.with_(message="; ".join(part for part in (result.message, said) if part))
+
+
+def _polished(solution: Solution, solver: IndirectShooting, accuracy: float) -> Solution:
+    """Polish a solution of a problem to which the minimum principle applies."""
     started = perf_counter()
-    program = solver.unjudged().prepare(ocp)
+    program = solver.unjudged().prepare(solution.problem)
     built = perf_counter()
     result = _newton(program, solution)
     if not result.status.is_success:

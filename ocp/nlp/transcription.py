@@ -10,6 +10,7 @@ from ocp.checks.arguments import check_instance
 from ocp.codegen.compile import compiled
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import Integrator, Stage
+from ocp.nlp.start_slope import start_slope, step_with_fixed_start
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
 from ocp.problem.nominal_sizes import time_unit
@@ -33,12 +34,16 @@ class Transcription:
         intervals: number of intervals N; a discrete-time problem brings its own.
         integrator: one-step method of each interval.
         compiled: whether stage and path constraints run as machine code.
+        start_as_data: whether a fixed start enters the first stage as a number along which nothing
+            is differentiated, for starts where a slope is not finite. z_0 stays an unknown
+            with equal bounds, so that the stages keep their structure.
     """
 
     ocp: OCP
     intervals: int
     integrator: Integrator
     compiled: bool = False
+    start_as_data: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no problem; the numbers are checked by the solvers."""
@@ -131,11 +136,12 @@ class Transcription:
             self.n,
         )
         w = ca.MX.sym("w", self.size)
-        data = ca.MX.sym("data", 1 + n_p * (2 * n + 1))
+        fixed = nx if self.start_as_data else 0
+        data = ca.MX.sym("data", 1 + n_p * (2 * n + 1) + fixed)
         t0 = data[0]
         p_left = ca.reshape(data[1 : 1 + n_p * n], n_p, n)
         p_right = ca.reshape(data[1 + n_p * n : 1 + 2 * n_p * n], n_p, n)
-        p_final = data[1 + 2 * n_p * n :]
+        p_final = data[1 + 2 * n_p * n : 1 + n_p * (2 * n + 1)]
         stages = ca.reshape(w[: -self.nz], self.nz + nu, n)
         z = ca.horzcat(stages[: self.nz, :], w[-self.nz :])
         x, u = z[:nx, :], stages[self.nz :, :]
@@ -145,10 +151,16 @@ class Transcription:
         h = duration / n
         t = t0 + h * ca.DM(np.arange(n)).T
         t_final = t0 + (self.time_unit * z[nx, -1] if ocp.has_free_time else ocp.duration)
-        after, costs = self.step.map(n)(x[:, :-1], u, t, h, p_left, p_right)
+        stages, nodes = [x[:, :-1], u, t, h, p_left, p_right], [x[:, :-1], u, t, p_left]
+        if self.start_as_data:
+            x0 = data[data.numel() - nx :]
+            after, costs = step_with_fixed_start(self.step, n, x0, stages)
+            (inside,) = step_with_fixed_start(self._path, n, x0, nodes)
+        else:
+            after, costs = self.step.map(n)(*stages)
+            inside = self._path.map(n)(*nodes)
         if ocp.has_free_time:
             after = ca.vertcat(after, z[nx, :-1])
-        inside = self._path.map(n)(x[:, :-1], u, t, p_left)
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         by_stage = ca.vertcat(z[:, 1:] - after, inside)
         g = ca.vertcat(
@@ -201,7 +213,9 @@ class Transcription:
     def data_vector(self, data: RunData) -> np.ndarray:
         """Return the numbers of the program's p."""
         left, right = data.values.on(self.fractions)
-        return np.concatenate([[data.t0], left.ravel(), right.ravel(), data.values.at(1.0)[0]])
+        x0 = data.x0 if self.start_as_data else []
+        final = data.values.at(1.0)[0]
+        return np.concatenate([[data.t0], left.ravel(), right.ravel(), final, x0])
 
     def worst(
         self, w: np.ndarray, g: np.ndarray, bounds: dict[str, np.ndarray]
@@ -224,11 +238,16 @@ class Transcription:
     ) -> np.ndarray:
         """Return dJ*/dx at the nodes, (N + 1, nx), from the multipliers.
 
-        At nodes 1..N minus the multiplier of the gap; at node 0 what balances the start.
+        At nodes 1..N minus the multiplier of the gap; at node 0 what balances the start. Of a
+        start that is data the slope itself; entries of it that are not finite, where J* has no
+        derivative, are replaced by those at node 1.
         """
         nx, initial = self.ocp.model.nx, self.ocp.at("initial")
         later = -lam_g[self._at("dynamics")].reshape(self.n, nx)
         first = -lam_x[:nx]
+        if self.start_as_data:
+            slope = self._start_slope(w, lam_g, data)
+            return np.vstack([np.where(np.isfinite(slope), slope, later[0]), later])
         if initial:
             p = data.values.at(0.0)[0]
             first = (
@@ -237,6 +256,27 @@ class Transcription:
                 @ lam_g[self._at("initial")]
             )
         return np.vstack([first, later])
+
+    def start_is_smooth(self, w: np.ndarray, data: RunData) -> bool:
+        """Return whether the first stage has finite slopes in a fixed start."""
+        if self.ocp.has_free_start:
+            return True
+        return bool(np.isfinite(self._start_slope(w, np.ones(len(self.rows)), data)).all())
+
+    def _start_slope(self, w: np.ndarray, lam_g: np.ndarray, data: RunData) -> np.ndarray:
+        """Derivative of the Lagrangian in x_0, (nx,)."""
+        left, right = data.values.on(self.fractions)
+        u, h = self.split(w)[1][0], self.duration(w) / self.n
+        of_after = -lam_g[self._at("dynamics")][: self.ocp.model.nx]
+        of_path = lam_g[self._at("path")][: len(self.ocp.rows.path.rows)]
+        value = self._start_slope_function(
+            data.x0, u, data.t0, h, left[0], right[0], of_after, of_path
+        )
+        return np.array(value).ravel()
+
+    @cached_property
+    def _start_slope_function(self) -> ca.Function:
+        return start_slope(self.ocp, self.integrator)
 
     # -- pieces ---------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_s
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
 from ocp.problem.describe import describe
+from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
@@ -304,20 +305,15 @@ class OCP:
             for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
                 self.guess.sample(part, np.array([0.0]), width)
         p = self.parameter_values().at(0.0)[0]
-        u = self.control_bounds.clip(np.zeros(model.nu))
-        functions = self.functions
-        for what, value in (
-            ("dynamics f", functions.rate(x0, u, 0.0, p)),
-            ("running_cost", functions.running_cost(x0, u, 0.0, p)),
-            ("terminal_cost", functions.terminal_cost(x0, 0.0, p)),
-            ("constraints", functions.path(x0, u, 0.0, p)),
-        ):
-            row = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
-            if row.size:
-                raise ProblemError(
-                    f"{self.name}: {what} (row {row[0]}) is not finite at x0 = {x0}, u = {u}: "
-                    "a singular start, or NaN in the data"
-                )
+        faults = [fault_at(self, x0, u, p) for u in self._first_controls()]
+        if all(faults):
+            raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")
+
+    def _first_controls(self) -> list[np.ndarray]:
+        """Return the controls with which solvers may start: of the guess or the bounds, and 0."""
+        given = self.guess.sample("u", np.array([0.0]), self.model.nu) if self.guess else None
+        zero = self.control_bounds.clip(np.zeros(self.model.nu))
+        return [inside(self.control_bounds) if given is None else given[0], zero]
 
     def _check_start_bounds(self, x0: np.ndarray) -> None:
         excess = self.state_bounds.excess(x0)

@@ -84,7 +84,10 @@ def _point(transcription: Transcription, solution: Solution) -> _Point:
     z = solution.x
     if ocp.has_free_time:
         z = np.hstack([z, np.full((len(z), 1), solution.duration)])
-    w, p = transcription.join(z, solution.u), transcription.data_vector(data)
+    w = transcription.join(z, solution.u)
+    if not transcription.start_is_smooth(w, data):
+        transcription = replace(transcription, start_as_data=True)
+    p = transcription.data_vector(data)
     program, bounds = transcription.program, transcription.bounds(data)
     weights = ca.MX.sym("weights", program["g"].numel())
     unknowns, given = program["x"], program["p"]

@@ -22,8 +22,15 @@ from solvers.collocation.collocation_points import CollocationPoints, Family
 from solvers.collocation.costates import costates
 from solvers.collocation.defects import Defects
 from solvers.collocation.mesh import CollocationGrid, Mesh
+from solvers.direct.first_trajectory import (
+    FirstStates,
+    first_duration,
+    first_states,
+    other_starts,
+)
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
-from solvers.direct.nlp_run import NlpOutcome, NlpRun
+from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_run import NlpRun
 
 
 @dataclass(frozen=True)
@@ -139,8 +146,13 @@ class CollocationProgram(MethodProgram):
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        first = self._first_iterate(data, guess)
-        outcome = self._nlp_run.solve(first.joined(), data)
+        ocp, duration = self.ocp, first_duration(self.ocp, guess)
+
+        def first(duration: float, source: FirstStates) -> np.ndarray:
+            return self._first_iterate(data, guess, duration, source).joined()
+
+        others = tuple(other_starts(ocp, guess, duration, first))
+        outcome = self._nlp_run.solve(first(duration, "tame"), data, others)
         return self._result(data, outcome)
 
     @cached_property
@@ -150,23 +162,31 @@ class CollocationProgram(MethodProgram):
 
     # -- the first iterate -------------------------------------------------------------------
 
-    def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> CollocationUnknowns:
-        """States and controls of the guess; without states, the controls' own roll-out."""
+    def _first_iterate(
+        self,
+        data: RunData,
+        guess: InitialGuess | None,
+        duration: float | None = None,
+        source: FirstStates = "tame",
+    ) -> CollocationUnknowns:
+        """States and controls of the guess; without states, see ``first_states``."""
         grid, ocp = self.transcription.grid, self.transcription.ocp
         m = ocp.model
         at_points = guess.sample("u", grid.at, m.nu) if guess else None
         u = np.zeros((len(grid.at), m.nu)) if at_points is None else at_points
         c = ocp.control_bounds.clip(self._coefficients(u))
-        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
         x = guess.sample("x", grid.nodes, m.nx) if guess else None
+        length = duration or first_duration(ocp, guess)
+
+        def rollout() -> np.ndarray:
+            return self.defects.rollout(self._elevated(c), length, data)
+
         if x is None:
-            x = self.defects.rollout(self._elevated(c), duration, data)
-        if not np.isfinite(x).all():
-            x = np.tile(data.x0, (len(grid.nodes), 1))
+            x = first_states(data.x0, len(grid.nodes), ocp.state_bounds, rollout, source)
         z = x[grid.edge_nodes].T
         if ocp.has_free_time:
-            length = duration / self.transcription.time_unit
-            z = np.vstack([z, np.full((1, z.shape[1]), length)])
+            time = np.full((1, z.shape[1]), length / self.transcription.time_unit)
+            z = np.vstack([z, time])
         return CollocationUnknowns(z, c.T, x[grid.point_nodes].T)
 
     def _coefficients(self, u: np.ndarray) -> np.ndarray:

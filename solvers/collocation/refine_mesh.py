@@ -38,14 +38,22 @@ class MeshRound:
         errors: of each interval: by how much the dynamics, integrated from node to node, miss
             the polynomial, relative to 1 + abs(x), or the running cost its quadrature, relative
             to 1 + abs(cost), (K,).
-        cost: what the solver believes.
-        status: how the solve ended.
+        solution: of this round alone.
     """
 
     mesh: Mesh
     errors: np.ndarray
-    cost: float
-    status: Status
+    solution: Solution
+
+    @property
+    def cost(self) -> float:
+        """The solver's own cost."""
+        return self.solution.cost
+
+    @property
+    def status(self) -> Status:
+        """How the solve ended."""
+        return self.solution.status
 
     @property
     def error(self) -> float:
@@ -58,9 +66,10 @@ class MeshRefinement:
     """A refined solution and how it came about.
 
     Attributes:
-        solution: on the last mesh, successful where every interval meets the accuracy; work,
+        solution: of the best round: the last that was solved, successful where every interval
+            meets the accuracy; the start where no round was solved and the start was. Work,
             iterations and times are those of all rounds.
-        rounds: the meshes, in order.
+        rounds: the meshes, in order, each with its solution.
     """
 
     solution: Solution
@@ -91,11 +100,12 @@ def refine_mesh(
     Args:
         start: a solution of any solver: the problem, its data, and the first guess.
         solver: points, options, and the first mesh; default ``Collocation(intervals=10)``.
-        accuracy: accepted error of an interval, see ``Round``.
+        accuracy: accepted error of an interval, see ``MeshRound``.
         rounds: meshes at most; ``INACCURATE`` if the last is still not fine enough.
 
     Returns:
-        the last solution and all meshes. A round that fails ends it, with its reason.
+        the best solution and all rounds. A round that fails ends it; its reason stands in the
+        message. An answer that was solved is never returned as anything worse than ``INACCURATE``.
 
     Raises:
         ProblemError: if an option is wrong.
@@ -121,19 +131,34 @@ def refine_mesh(
         data = start.data
         solution = program.run(x0=data.x0, t0=data.t0, parameters=start.parameters, guess=solution)
         errors = program.defects.errors(solution)
-        done.append(MeshRound(cells.mesh, errors, solution.cost, solution.status))
+        done.append(MeshRound(cells.mesh, errors, solution))
         work, iterations = work + solution.work, iterations + solution.iterations
         solve_time += solution.solve_time
         if not solution.status.is_success or done[-1].error <= accuracy:
             break
         cells = cells.finer(errors, accuracy)
-    last = done[-1]
-    if solution.status.is_success and not last.error <= accuracy:
-        reason = f"an interval is still wrong by {last.error:.2g} after {len(done)} meshes"
-        solution = solution.with_(status=Status.INACCURATE, message=reason)
     totals = {"work": work, "iterations": iterations, "solve_time": solve_time}
-    solution = judged(solution.with_(build_time=made, **totals), ACCURACY)
-    return MeshRefinement(solution, tuple(done))
+    best = _best(start, done, accuracy).with_(build_time=made, **totals)
+    return MeshRefinement(judged(best, ACCURACY), tuple(done))
+
+
+def _best(start: Solution, done: list[MeshRound], accuracy: float) -> Solution:
+    """Return the last round that was solved, with what is to be said of it."""
+    last = done[-1]
+    failure = f"mesh {len(done)} ended with {last.status.name}. {last.solution.message}".strip()
+    solved = [each for each in done if each.status.is_success]
+    if not solved and start.status.is_success:
+        said = f"the start itself, since no mesh was solved: {failure}"
+        return start.with_(message=said)
+    if not solved:
+        return last.solution
+    best = solved[-1]
+    if best.error <= accuracy:
+        return best.solution
+    said = f"an interval is still wrong by {best.error:.2g} after {len(done)} meshes"
+    if best is not last:
+        said = f"{said}; {failure}"
+    return best.solution.with_(status=Status.INACCURATE, message=said)
 
 
 @dataclass(frozen=True)

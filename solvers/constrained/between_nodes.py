@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import groupby
 from time import perf_counter
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -26,6 +28,8 @@ from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
 _MARGIN = "margin between the nodes"
+# How often the intervals are halved before a failure is reported.
+_REFINEMENTS = 2
 
 
 @dataclass(frozen=True)
@@ -38,16 +42,18 @@ class BetweenNodes(ScalingSolver):
 
     with margins δ, a signal, so that the inner program is built once. After each run δ grows
     near every node by what the referee finds violated there, between the nodes. Two or three
-    runs are enough where the constraint only bulges; where the trajectory jumps *through* an
-    obstacle from one node to the next, take more intervals.
+    runs are enough where the constraint only bulges. Where margins do not help, as where the
+    trajectory jumps *through* an obstacle from one node to the next, the intervals are halved,
+    twice at most, before a failure is reported.
 
     Equations along the path get no margin: none corrects what a held control does to them
-    between the nodes.
+    between the nodes. A terminal constraint that the exact dynamics miss, since the integrator
+    is too coarse, is ``INACCURATE``.
 
     Args:
         inner: the direct solver.
         tolerance: on the referee's violation, in the units of the constraints.
-        max_rounds: limit of runs of the inner solver.
+        max_rounds: limit of runs of the inner solver on each grid.
     """
 
     inner: MultipleShooting = field(default_factory=MultipleShooting)
@@ -106,42 +112,55 @@ class BetweenNodesProgram(Program):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Run, evaluate, widen the margins, and repeat."""
-        started, tolerance = perf_counter(), self.solver.tolerance
-        nodes = np.linspace(0.0, 1.0, self.solver.inner.intervals + 1)
-        margin = np.zeros((len(nodes), self.rows.size))
-        runs: list[Solution] = []
-        while True:
-            added = {_MARGIN: margin} if self.rows.size else {}
-            inner = self.inner.run(
-                x0=x0, t0=t0, parameters={**(parameters or {}), **added}, guess=guess
-            )
-            values = {k: v for k, v in inner.parameters.items() if k != _MARGIN}
-            runs.append(inner.with_(problem=self.ocp, parameters=values))
-            verdict = evaluate(runs[-1])
-            done = verdict.violation <= tolerance or len(runs) == self.solver.max_rounds
-            if done or not inner.status.is_success:
+        """Run, evaluate, widen the margins, and repeat; on finer grids where that fails."""
+        started, program = perf_counter(), self
+        given = {"x0": x0, "t0": t0}
+        rounds = self._tighten(given, parameters, guess)
+        runs = rounds.runs
+        for _ in range(_REFINEMENTS):
+            if not rounds.may_gain_from_refinement:
                 break
-            found = self.rows.worst_near_nodes(verdict, nodes)
-            excess = np.where(self.rows.is_equation, 0.0, np.maximum(0.0, found))
-            margin = margin + np.where(excess > 0.0, excess + tolerance / 2, 0.0)
-            guess = inner
-        status, message = self._verdict(runs, verdict.violation, verdict.worst, margin)
+            program = program._finer
+            rounds = program._tighten(given, parameters, runs[-1])
+            runs = [*runs, *rounds.runs]
+        intervals = program.solver.inner.intervals
+        status, message = rounds.judge(intervals)
         found = self._solution(runs, status, message, perf_counter() - started)
         return judged(found, self.solver.inner.success_accuracy, between_nodes=False)
 
-    def _verdict(
-        self, runs: list[Solution], violation: float, worst: str, margin: np.ndarray
-    ) -> tuple[Status, str]:
-        last = runs[-1]
-        if last.status.is_success and violation <= self.solver.tolerance:
-            return last.status, last.message
-        if last.status.is_success:
-            return Status.NO_PROGRESS, f"{worst} is violated by {violation:.3g} between the nodes"
-        if not margin.any():
-            return last.status, last.message
-        more = f"with margins up to {margin.max():.3g} for what happens between the nodes"
-        return last.status, f"{last.message} {more}: take more intervals".strip()
+    def _tighten(
+        self,
+        given: Mapping[str, Any],
+        parameters: Mapping[str, ArrayLike] | None,
+        guess: InitialGuess | None,
+    ) -> "_Rounds":
+        """Widen the margins on this grid until they suffice or do not help."""
+        tolerance, intervals = self.solver.tolerance, self.solver.inner.intervals
+        nodes = np.linspace(0.0, 1.0, intervals + 1)
+        margin, runs = np.zeros((len(nodes), self.rows.size)), []
+        while True:
+            added = {_MARGIN: margin} if self.rows.size else {}
+            inner = self.inner.run(**given, parameters={**(parameters or {}), **added}, guess=guess)
+            values = {k: v for k, v in inner.parameters.items() if k != _MARGIN}
+            runs.append(inner.with_(problem=self.ocp, parameters=values))
+            verdict = evaluate(runs[-1])
+            excess = np.zeros_like(margin)
+            if self.rows.size:
+                found = self.rows.worst_near_nodes(verdict, nodes)
+                excess = np.where(self.rows.is_equation, 0.0, np.maximum(0.0, found))
+            along = float(excess.max(initial=0.0))
+            rounds = _Rounds(runs, verdict.violation, verdict.worst, along, margin, tolerance)
+            is_done = verdict.violation <= tolerance or len(runs) == self.solver.max_rounds
+            if is_done or along <= tolerance or not inner.status.is_success:
+                return rounds
+            margin = margin + np.where(excess > 0.0, excess + tolerance / 2, 0.0)
+            guess = inner
+
+    @cached_property
+    def _finer(self) -> "BetweenNodesProgram":
+        """The same with half the intervals' length, built at the first use."""
+        inner = replace(self.solver.inner, intervals=2 * self.solver.inner.intervals)
+        return replace(self.solver, inner=inner).prepare(self.ocp)
 
     def _solution(
         self, runs: list[Solution], status: Status, message: str, seconds: float
@@ -158,6 +177,54 @@ class BetweenNodesProgram(Program):
             work=work,
             solve_time=seconds,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Rounds:
+    """The runs on one grid.
+
+    Attributes:
+        runs: of the inner solver.
+        violation: of the last one, by the referee.
+        worst: what it violates most.
+        along: violation of path inequalities and state bounds alone.
+        margin: of the last run.
+        tolerance: on the violation.
+    """
+
+    runs: list[Solution]
+    violation: float
+    worst: str
+    along: float
+    margin: np.ndarray
+    tolerance: float
+
+    @property
+    def may_gain_from_refinement(self) -> bool:
+        """Whether margins or the grid may be why it failed."""
+        last = self.runs[-1]
+        if last.status.is_success:
+            return self.violation > self.tolerance
+        return bool(self.margin.any()) or last.status is Status.INACCURATE
+
+    def judge(self, intervals: int) -> tuple[Status, str]:
+        """Return status and message."""
+        last = self.runs[-1]
+        if last.status.is_success and self.violation <= self.tolerance:
+            return last.status, last.message
+        if last.status.is_success and self.along <= self.tolerance:
+            return Status.INACCURATE, (
+                f"{self.worst} is missed by {self.violation:.3g} when the controls are integrated "
+                f"exactly: the integrator is too coarse on {intervals} intervals; take more "
+                "intervals or more integration steps"
+            )
+        if last.status.is_success:
+            said = f"{self.worst} is violated by {self.violation:.3g} between the nodes"
+            return Status.NO_PROGRESS, f"{said} of {intervals} intervals"
+        if not self.margin.any():
+            return last.status, last.message
+        more = f"with margins up to {self.margin.max():.3g} for what happens between the nodes"
+        return last.status, f"{last.message} {more} of {intervals} intervals".strip()
 
 
 def _tightened(ocp: OCP, rows: StandardForm, intervals: int) -> OCP:

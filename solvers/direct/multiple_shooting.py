@@ -17,14 +17,20 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
+from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
-from solvers.direct.nlp_run import NlpOutcome, NlpRun
+from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 
 
 @dataclass(frozen=True)
 class MultipleShooting(ScalingSolver):
     """The direct baseline, for every kind of problem that can be described.
+
+    Without states in the guess it starts from the roll-out of the controls, or from the start held
+    where that explodes. ``SOLVED`` is said by the unscaled optimality conditions; where the backend
+    stopped before its tolerance, a residual up to 5e-4 is accepted, and the message gives it.
 
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
 
@@ -39,15 +45,16 @@ class MultipleShooting(ScalingSolver):
             interval is halved; a solution beyond it is ``INACCURATE``.
         verbose: let the backend print.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
-        time_limit: for each run of the backend, of which a solve may take three [s]; inf:
+        time_limit: for each run of the backend, of which a solve may take some [s]: other first
+            iterates are not tried once it has passed; inf:
             unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT returns its iterate,
             ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; with a
             limit it runs in a process of its own, and a process that is ended returns no iterate:
             ``FAILED``.
         feasibility_restoration: after a failure, find the trajectory that violates the
             constraints least: it tells whether the problem is infeasible, and is a better first
-            iterate if it is not. It may cost 300 iterations; turn it off in a controller with a
-            deadline.
+            iterate if it is not; after that, try other first iterates. Each may cost 300
+            iterations; turn it off in a controller with a deadline.
     """
 
     intervals: int = 75
@@ -114,9 +121,17 @@ class MultipleShootingProgram(MethodProgram):
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
-        z, u = self.first_iterate(data, guess)
-        outcome = self._nlp_run.solve(self.transcription.join(z, u), data)
-        return self._result(data, outcome)
+        ocp, duration = self.ocp, first_duration(self.ocp, guess)
+
+        def first(duration: float, source: FirstStates) -> np.ndarray:
+            return self.transcription.join(*self._iterate(data, guess, duration, source))
+
+        w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
+        outcome = self._nlp_run.solve(w0, data, others)
+        if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
+            outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
+            return self._result(data, outcome, self._without_slope)
+        return self._result(data, outcome, self.transcription)
 
     @cached_property
     def _nlp_run(self) -> NlpRun:
@@ -129,18 +144,30 @@ class MultipleShootingProgram(MethodProgram):
             feasibility_restoration=self.solver.feasibility_restoration,
         )
 
+    @cached_property
+    def _without_slope(self) -> Transcription:
+        """For a fixed start at which a slope is not finite: nothing is differentiated there."""
+        return replace(self.transcription, start_as_data=True, compiled=False)
+
+    @cached_property
+    def _nlp_run_without_slope(self) -> NlpRun:
+        nlp = self.solver.nlp_backend.build(self._without_slope)
+        return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
+
     # -- the first iterate -------------------------------------------------------------------
 
     def first_iterate(
         self, data: RunData, guess: InitialGuess | None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states and controls of the guess, a free final time with the states."""
-        tr, ocp = self.transcription, self.transcription.ocp
-        duration = (guess.duration if guess and ocp.has_free_time else None) or ocp.duration
-        x, u = self.grid.first_iterate(data, guess, duration)
-        if ocp.has_free_time:
-            x = np.hstack([x, np.full((tr.n + 1, 1), duration / tr.time_unit)])
-        return x, u
+        return self._iterate(data, guess, first_duration(self.ocp, guess), "tame")
+
+    def _iterate(
+        self, data: RunData, guess: InitialGuess | None, duration: float, source: FirstStates
+    ) -> tuple[np.ndarray, np.ndarray]:
+        x, u = self.grid.first_iterate(data, guess, duration, source)
+        length = duration / self.transcription.time_unit
+        return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
 
     # -- the result ---------------------------------------------------------------------------
 
@@ -151,9 +178,9 @@ class MultipleShootingProgram(MethodProgram):
         schedule = self.grid.schedule(data, tr.duration(result.w))
         return self.grid.error(z[:, : tr.ocp.model.nx], u, schedule)
 
-    def _result(self, data: RunData, outcome: NlpOutcome) -> RunResult:
+    def _result(self, data: RunData, outcome: NlpOutcome, tr: Transcription) -> RunResult:
         """The last result, with the work of all runs."""
-        tr, result = self.transcription, outcome.last
+        result = outcome.last
         z, u = tr.split(result.w)
         return RunResult(
             status=outcome.status,

@@ -36,6 +36,8 @@ class NlpBackend:
             iterate. fatrop has no time limit, and may try for ever to solve a singular linear
             system inside one iteration. With a limit it runs in a process of its own, see
             ``SubprocessFunction``; a process that is ended returns no iterate.
+        dependent_rows: let IPOPT regularise its linear system in every iteration, for constraints
+            whose gradients depend on each other.
     """
 
     name: Literal["ipopt", "fatrop"] = "ipopt"
@@ -43,6 +45,7 @@ class NlpBackend:
     max_iterations: int = 300
     verbose: bool = False
     time_limit: float = np.inf
+    dependent_rows: bool = False
 
     def check(self) -> None:
         """Check the options.
@@ -90,7 +93,8 @@ class NlpBackend:
         clock = {"ipopt.max_wall_time": self.time_limit} if self.time_limit < np.inf else {}
         # IPOPT otherwise returns controls outside their bounds, by up to 1e-8 relative.
         relax = {"ipopt.bound_relax_factor": 0.0}
-        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock}
+        rows = {"ipopt.perturb_always_cd": "yes"} if self.dependent_rows else {}
+        return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock, **rows}
 
     def _fatrop(self, transcription: TranscribedProblem) -> dict[str, Any]:
         if not isinstance(transcription, Transcription):
@@ -162,6 +166,7 @@ class NlpResult:
         lam_g: multipliers of the constraints.
         stats: the backend's statistics.
         is_lost: whether its process ended before it returned.
+        residual: of the first-order conditions, where it was judged; None: see the statistics.
     """
 
     w: np.ndarray
@@ -171,6 +176,7 @@ class NlpResult:
     lam_g: np.ndarray
     stats: dict[str, Any]
     is_lost: bool = False
+    residual: float | None = None
 
     @classmethod
     def without_iterate(
@@ -189,6 +195,11 @@ class NlpResult:
     def return_status(self) -> str:
         """The backend's own name of how it ended."""
         return str(self.stats.get("return_status", ""))
+
+    @property
+    def is_undefined(self) -> bool:
+        """Whether the backend met a number that is not finite."""
+        return not np.isfinite(self.cost) or self.return_status == "Invalid_Number_Detected"
 
     @property
     def iterations(self) -> int:

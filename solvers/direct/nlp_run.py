@@ -1,30 +1,35 @@
-"""How a direct method solves its nonlinear program: up to four phases around a backend.
+"""How a direct method solves its nonlinear program: phases around a backend.
 
-``NlpRun.solve`` names them: solve from the first iterate; solve again from perturbed controls if
-the backend did not move; restore feasibility if it failed; solve again from there. Each phase
-returns an ``NlpOutcome``, or the trajectory that violates the constraints least.
+``NlpRun.solve`` names them: solve from the first iterate, and again from there where the answer is
+one only after the backend's scaling; solve from perturbed controls where some did not move; restore
+feasibility if it failed, and solve from there; solve from other first iterates. Each phase returns
+an ``NlpOutcome``.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from time import perf_counter
 
 import numpy as np
 
-from ocp import Status, Work
-from ocp.internal import ConstraintRow, RunData, Violation, start_violation
-from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
+from ocp import Status
+from ocp.internal import RunData, start_violation
+from solvers.direct.curvature_check import has_negative_curvature
+from solvers.direct.feasibility_restoration import FeasibilityRestoration
 from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
+from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
+from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved
 
-# Constraint violations above this count, also if the backend accepts them after scaling.
-_VIOLATED = 1e-6
-# Standard deviation of the perturbation of the controls, relative to 1 + abs(u).
-_PERTURBATION = 1e-3
-# Changes of the controls below this, relative to 1 + abs(u), count as none.
-_UNCHANGED = 1e-6
 # A least violation up to this counts as feasible: the elastic problem is solved to its tolerance.
 _FEASIBLE = 1e-5
+# Multipliers beyond this at a violation below that: the constraints' gradients depend on each
+# other.
+_UNBOUNDED, _CLOSE = 1e8, 1e-3
+# A lower cost counts from this on, relative to 1 + abs(cost).
+_LOWER = 1e-6
 # Failures that an infeasible problem may cause. INACCURATE is one of them: to meet a constraint
 # that cannot be met an optimiser may exploit the integrator's error.
 _MAYBE_INFEASIBLE = (
@@ -33,57 +38,13 @@ _MAYBE_INFEASIBLE = (
     Status.FAILED,
     Status.INACCURATE,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class NlpOutcome:
-    """How the phases so far have ended.
-
-    Attributes:
-        results: of every run of a backend; the last one is returned to the user.
-        status: how it ended.
-        message: what went wrong, and when on the horizon.
-    """
-
-    results: tuple[NlpResult, ...]
-    status: Status
-    message: str
-
-    @property
-    def last(self) -> NlpResult:
-        """The result that counts."""
-        return self.results[-1]
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of all runs."""
-        return sum(result.iterations for result in self.results)
-
-    @property
-    def work(self) -> Work:
-        """Work of all runs."""
-        return sum((result.work for result in self.results), Work())
-
-    def history(self) -> dict[str, np.ndarray]:
-        """Return cost, infeasibility and residual of each iteration of the last run."""
-        names = {"cost": "obj", "infeasibility": "inf_pr", "residual": "inf_du"}
-        return {name: self.last.history(own) for name, own in names.items()}
-
-    @property
-    def residual(self) -> float:
-        """The last dual infeasibility; 0 where the backend records none."""
-        values = self.last.history("inf_du")
-        return float(values[-1]) if values.size else 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Inputs:
-    """The inputs of one solve: first iterate w0 within its bounds, p, bounds; ``data`` as given."""
-
-    w0: np.ndarray
-    p: np.ndarray
-    bounds: dict[str, np.ndarray]
-    data: RunData
+# Failures that a first iterate may cause.
+_MAYBE_FIRST_ITERATE = (
+    Status.INFEASIBLE,
+    Status.ITERATION_LIMIT,
+    Status.DIVERGED,
+    Status.FAILED,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +57,7 @@ class NlpRun:
         accuracy: the largest accepted error of a state, relative to 1 + abs(x).
         state_error: (result, data) -> the largest such error, and the node where it occurs.
         feasibility_restoration: whether a failure is followed by a search for the least
-            violating trajectory.
+            violating trajectory, and by other first iterates.
     """
 
     transcription: TranscribedProblem
@@ -105,54 +66,150 @@ class NlpRun:
     state_error: Callable[[NlpResult, RunData], tuple[float, int]]
     feasibility_restoration: bool = True
 
-    def solve(self, w0: np.ndarray, data: RunData) -> NlpOutcome:
-        """Solve for these data from a first iterate, which is clipped to the bounds."""
-        inputs = self._inputs(w0, data)
-        outcome = self.first_solve(inputs)
-        if outcome.status is Status.SOLVED and not self._has_moved(inputs.w0, outcome.last.w):
-            outcome = self.solve_from_perturbed(inputs, outcome)
-        if not self._may_be_infeasible(outcome):
-            return outcome
-        least = self.restore_feasibility(inputs)
-        if least is None:
-            return outcome
-        if least.violation <= _FEASIBLE:
-            return self.resolve(inputs, outcome, least)
-        return self._infeasible(inputs, outcome, least)
+    def solve(self, w0: np.ndarray, data: RunData, others: Sequence[OtherStart] = ()) -> NlpOutcome:
+        """Solve for these data from a first iterate, which is clipped to the bounds.
+
+        Args:
+            w0: first iterate.
+            data: of the run.
+            others: first iterates to try before a failure is reported.
+        """
+        started, inputs = perf_counter(), self._inputs(w0, data)
+        outcome = self._run_to_an_optimum(inputs)
+        if self._may_be_infeasible(outcome):
+            outcome = self.restore_feasibility(inputs, outcome)
+        if self._may_start_elsewhere(outcome, data):
+            outcome = self.solve_from_others(inputs, outcome, others, started)
+        return outcome
 
     # -- the phases ------------------------------------------------------------------------------
 
-    def first_solve(self, inputs: _Inputs) -> NlpOutcome:
-        """Run the backend from the first iterate."""
-        return self._run(inputs, inputs.w0, ())
+    def first_solve(self, inputs: NlpInputs, nlp: Nlp) -> NlpOutcome:
+        """Run a backend from the first iterate, and again where only its scaling was met."""
+        outcome = self._run(nlp, inputs, inputs.w0)
+        if outcome.status is Status.FAILED and outcome.last.success:
+            outcome = self._run(nlp, inputs, outcome.last.w).after(outcome)
+        return outcome
 
-    def solve_from_perturbed(self, inputs: _Inputs, first: NlpOutcome) -> NlpOutcome:
+    def solve_from_perturbed(self, inputs: NlpInputs, first: NlpOutcome, nlp: Nlp) -> NlpOutcome:
         """Run the backend from a perturbation of its result.
 
         A backend tests curvature along its steps only: one that makes none accepts a maximum or
-        a saddle as well. From a minimum the second run returns at once.
+        a saddle as well. From a minimum the second run returns at once. fatrop may return to a
+        saddle even so: then IPOPT decides.
         """
-        w = self._perturbed(first.last.w, inputs.bounds)
-        second = self.nlp.solve(w, inputs.p, inputs.bounds)
-        if second.is_lost:
-            message = f"from perturbed controls, {self._lost(second)}"
-            return NlpOutcome((second, *first.results), Status.STATIONARY, message)
-        return NlpOutcome((*first.results, second), *self._judge(inputs, second))
+        every = np.ones(self.transcription.ocp.model.nu, dtype=bool)
+        w = perturbed(self.transcription, inputs, first.last.w, every)
+        second = self._run(nlp, inputs, w)
+        is_unknown = second.status is Status.FAILED and not self._is_lower(inputs, second, first)
+        if is_unknown and nlp.backend.name == "ipopt" and not nlp.backend.dependent_rows:
+            return self.solve_from_perturbed(inputs, first, self._for_dependent_rows)
+        if second.last.is_lost or is_unknown:
+            message = f"from perturbed controls, {second.message}"
+            return replace(first.after(second), status=Status.STATIONARY, message=message)
+        is_checked = nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
+        if is_checked or not has_negative_curvature(nlp.function, second.last, inputs):
+            return second.after(first)
+        return self._run(self._ipopt, inputs, w).after(second.after(first))
 
-    def restore_feasibility(self, inputs: _Inputs) -> LeastViolation | None:
-        """Find the least violating trajectory near the first iterate; None if that fails."""
-        return self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+    def solve_from_some_perturbed(
+        self, inputs: NlpInputs, first: NlpOutcome, nlp: Nlp, which: np.ndarray
+    ) -> NlpOutcome:
+        """Run a backend from a result with some controls perturbed; keep the better answer.
 
-    def resolve(self, inputs: _Inputs, failed: NlpOutcome, least: LeastViolation) -> NlpOutcome:
-        """Run the backend again, from a feasible trajectory."""
-        return self._run(inputs, least.result.w, (*failed.results, least.result))
+        Where the derivative in a control vanishes by symmetry no step changes it, at a saddle as
+        little as at a minimum.
+        """
+        w = perturbed(self.transcription, inputs, first.last.w, which)
+        second = self._run(nlp, inputs, w)
+        is_lower = self._is_lower(inputs, second, first)
+        if second.status.is_success and is_lower:
+            return second.after(first)
+        kept = first.after(second)
+        if not is_lower:
+            return kept
+        names = [n for n, on in zip(self.transcription.ocp.model.u_names, which, strict=True) if on]
+        message = (
+            f"no minimum: from perturbed {', '.join(names)} the cost falls to "
+            f"{second.last.cost:.6g}, where {nlp.backend.name} ended with {second.status.name}"
+        )
+        return replace(kept, status=Status.STATIONARY, message=message)
+
+    def restore_feasibility(self, inputs: NlpInputs, failed: NlpOutcome) -> NlpOutcome:
+        """Find the least violating trajectory; from a feasible one, run the backend again."""
+        least = self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+        if least is None:
+            return failed
+        found = replace(failed, results=(*failed.results, least.result))
+        if least.violation <= _FEASIBLE:
+            return self._run_to_an_optimum(replace(inputs, w0=least.result.w)).after(found)
+        message = self._verdict.where(least.result, inputs.data, least.violation, least.row)
+        return replace(found, status=Status.INFEASIBLE, message=message)
+
+    def solve_from_others(
+        self, first: NlpInputs, failed: NlpOutcome, others: Sequence[OtherStart], started: float
+    ) -> NlpOutcome:
+        """Solve from other first iterates, until one succeeds or the time limit has passed."""
+        tried: list[OtherStart] = []
+        begun, results = [first.w0], failed.results
+        for other in others:
+            if perf_counter() - started > self.nlp.backend.time_limit:
+                break
+            inputs = self._inputs(other.make(), first.data)
+            if any(np.array_equal(inputs.w0, earlier) for earlier in begun):
+                continue
+            outcome = self._run_to_an_optimum(inputs)
+            tried.append(other)
+            begun.append(inputs.w0)
+            is_better = outcome.status.is_success or (
+                failed.status is Status.DIVERGED and outcome.status is Status.INACCURATE
+            )
+            if is_better:
+                message = outcome.message
+                if outcome.status.is_success:
+                    said = f"from {other.words}; from the first iterate: {failed.status.name}"
+                    message = f"{message}; {said}" if message else said
+                results = (*results, *outcome.results)
+                return NlpOutcome(results, outcome.status, message)
+            results = (*outcome.results, *results)
+        times = ", ".join(f"{other.duration:.4g} s" for other in tried if other.duration)
+        said = f"guesses of the final time of {times} lead nowhere either" if times else ""
+        message = "; ".join(part for part in (failed.message, said) if part)
+        return NlpOutcome(results, failed.status, message)
 
     # -- when to enter a phase -------------------------------------------------------------------
 
-    def _has_moved(self, w0: np.ndarray, w: np.ndarray) -> bool:
-        """Whether any control differs from the first iterate's."""
-        before, after = (each[self.transcription.is_control] for each in (w0, w))
-        return bool(np.any(np.abs(after - before) > _UNCHANGED * (1.0 + np.abs(before))))
+    def _run_to_an_optimum(self, inputs: NlpInputs, nlp: Nlp | None = None) -> NlpOutcome:
+        """Run from a first iterate, and from perturbed controls where some did not move."""
+        chosen, problem = nlp or self.nlp, self.transcription
+        first = self.first_solve(inputs, chosen)
+        if nlp is None and self._has_dependent_rows(inputs, first):
+            return self._run_to_an_optimum(inputs, self._for_dependent_rows).after(first)
+        if first.status is not Status.SOLVED:
+            return first
+        still = unmoved(problem, inputs, first.last.w)
+        if still.all():
+            return self.solve_from_perturbed(inputs, first, chosen)
+        hidden = still & ~at_bounds(problem, inputs, first.last.w)
+        if not hidden.any():
+            return first
+        return self.solve_from_some_perturbed(inputs, first, chosen, hidden)
+
+    def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome) -> bool:
+        """Whether IPOPT failed close to the constraints, with multipliers without bound."""
+        if outcome.status not in (Status.FAILED, Status.ITERATION_LIMIT):
+            return False
+        last, is_ipopt = outcome.last, self.nlp.backend.name == "ipopt"
+        violation, _ = self.transcription.worst(last.w, last.g, inputs.bounds)
+        unbounded = np.abs(last.lam_g).max(initial=0.0) > _UNBOUNDED
+        return is_ipopt and bool(unbounded) and violation <= _CLOSE
+
+    def _is_lower(self, inputs: NlpInputs, second: NlpOutcome, first: NlpOutcome) -> bool:
+        """Whether the constraints still hold and the cost has fallen."""
+        before, after = first.last, second.last
+        violation, _ = self.transcription.worst(after.w, after.g, inputs.bounds)
+        has_fallen = after.cost < before.cost - _LOWER * (1.0 + abs(before.cost))
+        return violation <= _FEASIBLE and has_fallen
 
     def _may_be_infeasible(self, outcome: NlpOutcome) -> bool:
         ocp = self.transcription.ocp
@@ -161,84 +218,45 @@ class NlpRun:
             self.feasibility_restoration and is_constrained and outcome.status in _MAYBE_INFEASIBLE
         )
 
+    def _may_start_elsewhere(self, outcome: NlpOutcome, data: RunData) -> bool:
+        return (
+            self.feasibility_restoration
+            and outcome.status in _MAYBE_FIRST_ITERATE
+            and not start_violation(self.transcription.ocp, data)
+        )
+
     # -- what the phases use ---------------------------------------------------------------------
 
     @cached_property
     def _restoration(self) -> FeasibilityRestoration:
         return FeasibilityRestoration(self.transcription, self.nlp.backend.time_limit)
 
-    def _inputs(self, w0: np.ndarray, data: RunData) -> _Inputs:
+    @cached_property
+    def _verdict(self) -> NlpVerdict:
+        return NlpVerdict(self.transcription, self.nlp, self.accuracy, self.state_error)
+
+    @cached_property
+    def _for_dependent_rows(self) -> Nlp:
+        """IPOPT for the same program, with a regularised linear system."""
+        return replace(self.nlp.backend, dependent_rows=True).build(self.transcription)
+
+    @cached_property
+    def _ipopt(self) -> Nlp:
+        """IPOPT for the same program, built where fatrop's answer may be a saddle."""
+        return replace(self.nlp.backend, name="ipopt").build(self.transcription)
+
+    def _inputs(self, w0: np.ndarray, data: RunData) -> NlpInputs:
         bounds = self.transcription.bounds(data)
         w0 = np.clip(w0, bounds["lbx"], bounds["ubx"])
-        return _Inputs(w0, self.transcription.data_vector(data), bounds, data)
+        return NlpInputs(w0, self.transcription.data_vector(data), bounds, data)
 
-    def _run(self, inputs: _Inputs, w: np.ndarray, earlier: tuple[NlpResult, ...]) -> NlpOutcome:
-        """Run the backend from an iterate, after earlier runs."""
-        result = self.nlp.solve(w, inputs.p, inputs.bounds)
-        return NlpOutcome((*earlier, result), *self._judge(inputs, result))
-
-    def _perturbed(self, w: np.ndarray, bounds: dict[str, np.ndarray]) -> np.ndarray:
-        """Return unknowns with slightly different controls; the same for the same unknowns."""
-        w, at = w.copy(), self.transcription.is_control
-        u = w[at]
-        w[at] += _PERTURBATION * np.random.default_rng(0).normal(size=u.shape) * (1.0 + np.abs(u))
-        return np.clip(w, bounds["lbx"], bounds["ubx"])
-
-    # -- status and message ----------------------------------------------------------------------
-
-    def _judge(self, inputs: _Inputs, result: NlpResult) -> tuple[Status, str]:
-        """Status and message, from the backend's status, the constraints and the integrator."""
-        if result.is_lost:
-            return Status.FAILED, self._lost(result)
-        if not np.isfinite(result.cost):
-            status = result.return_status
-            return Status.DIVERGED, f"the backend met a number that is not finite ({status})"
-        violation, row = self.transcription.worst(result.w, result.g, inputs.bounds)
-        is_violated = violation > _VIOLATED
-        if result.success and not is_violated:
-            return self._judge_solution(inputs, result)
-        where = self._where(result, inputs.data, violation, row) if is_violated else ""
-        return self._judge_failure(result, where)
-
-    def _judge_solution(self, inputs: _Inputs, result: NlpResult) -> tuple[Status, str]:
-        """Status of a result that meets the constraints."""
-        if message := start_violation(self.transcription.ocp, inputs.data):
-            return Status.INFEASIBLE, message
-        error, node = self.state_error(result, inputs.data)
-        if error <= self.accuracy:
-            return Status.SOLVED, ""
-        t = self.times(result, inputs.data)[node]
-        return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t:.4g} s"
-
-    def _judge_failure(self, result: NlpResult, where: str) -> tuple[Status, str]:
-        """Status of a result that the backend or a constraint rejects."""
-        backend, return_status = self.nlp.backend, result.return_status
-        if result.iterations >= backend.max_iterations:
-            return Status.ITERATION_LIMIT, where
-        if return_status == "Maximum_WallTime_Exceeded":
-            return Status.TIME_LIMIT, where
-        if return_status == "Diverging_Iterates":
-            return Status.DIVERGED, where or "the cost may be unbounded below"
-        return Status.FAILED, f"{backend.name} says {return_status}. {where}".strip()
-
-    def _infeasible(self, inputs: _Inputs, failed: NlpOutcome, least: LeastViolation) -> NlpOutcome:
-        """Return the least violating trajectory, and what it violates."""
-        message = self._where(least.result, inputs.data, least.violation, least.row)
-        return NlpOutcome((*failed.results, least.result), Status.INFEASIBLE, message)
-
-    def _lost(self, result: NlpResult) -> str:
-        return f"{self.nlp.backend.name} {result.return_status}"
-
-    def _where(
-        self, result: NlpResult, data: RunData, violation: float, row: ConstraintRow | None
-    ) -> str:
-        """Return what is violated, by how much and when."""
-        if row is None:
-            return ""
-        t = self.times(result, data)[row.node]
-        return str(Violation(violation, row, t))
+    def _run(self, nlp: Nlp, inputs: NlpInputs, w: np.ndarray) -> NlpOutcome:
+        """Run a backend from an iterate."""
+        result = nlp.solve(w, inputs.p, inputs.bounds)
+        verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
+        judged = verdict.judge(inputs, result)
+        return NlpOutcome((judged.result,), judged.status, judged.message)
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""
-        duration = self.transcription.duration(result.w)
-        return data.t0 + self.transcription.fractions * duration
+        return self._verdict.times(result, data)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp import OCP, InitialGuess, Integrator
 from ocp.internal import BufferedFunction, RunData, Stage, compiled, sizes_of
+from solvers.direct.first_trajectory import FirstStates, first_states
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,22 +51,27 @@ class ShootingGrid:
         return [t, np.full((1, self.n), duration / self.n), left.T, right.T]
 
     def first_iterate(
-        self, data: RunData, guess: InitialGuess | None, duration: float
+        self,
+        data: RunData,
+        guess: InitialGuess | None,
+        duration: float,
+        source: FirstStates = "tame",
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states (N + 1, nx) and controls (N, nu) of a guess.
 
-        A guess without states: the roll-out of its controls, or x0 at all nodes if the states
-        are not finite.
+        A guess without states: see ``first_states``.
         """
         ocp, m, nodes = self.ocp, self.ocp.model, self.fractions
         x = guess.sample("x", nodes, m.nx) if guess else None
         u = guess.sample("u", nodes[:-1], m.nu) if guess else None
         u = ocp.control_bounds.clip(np.zeros((self.n, m.nu)) if u is None else u)
+
+        def rollout() -> np.ndarray:
+            after, _ = self.rollout(data.x0, u.T, *self.schedule(data, duration))
+            return np.vstack([data.x0, after.T])
+
         if x is None:
-            x, _ = self.rollout(data.x0, u.T, *self.schedule(data, duration))
-            x = np.vstack([data.x0, x.T])
-        if not np.isfinite(x).all():
-            x = np.tile(data.x0, (self.n + 1, 1))
+            x = first_states(data.x0, self.n + 1, ocp.state_bounds, rollout, source)
         return x, u
 
     def error(self, x: np.ndarray, u: np.ndarray, schedule: list[np.ndarray]) -> tuple[float, int]:

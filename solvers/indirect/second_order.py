@@ -40,6 +40,8 @@ def second_order(
     :math:`H_{uu} > 0` the extremal is a minimum [Bryson & Ho 1975, ch. 6]. On a start
     manifold S has to be positive definite on its tangent as well. Carrying the plane instead
     of S needs no special case for terminal constraints, where S is unbounded at the end.
+    Directions of the plane along which X vanishes at every instant, as where the end fixes a
+    state that no control changes, admit no variation and are left out.
 
     Args:
         extremals: the boundary value problem.
@@ -56,6 +58,7 @@ def second_order(
         return SecondOrder(False, f"H_uu is not positive definite at t = {concave:.4g} s")
     plane, nx = _final_plane(extremals, paths, nu, schedule), ocp.model.nx
     slopes, _ = extremals.step_slopes(paths, schedule, duration)
+    plane = plane @ _varied(plane, slopes)
     # Under terminal constraints X vanishes at the end itself, and has to grow out of it.
     grown = _is_regular(plane[:nx])
     for k in range(len(slopes) - 1, -1, -1):
@@ -73,9 +76,32 @@ def second_order(
     return SecondOrder(True)
 
 
+def _varied(plane: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Return a basis of the plane's directions along which X ever differs from 0, (nx, r)."""
+    nx = plane.shape[1]
+    still, turns = _kernel(plane[:nx]), []
+    for slope in slopes[::-1]:
+        if not still.size:
+            return np.eye(nx)
+        plane, turn = np.linalg.qr(np.linalg.solve(slope, plane))
+        turns.append(turn)
+        still = _orthonormal(turn @ still)
+        still = still @ _kernel(plane[:nx] @ still)
+    for turn in turns[::-1]:  # the coordinates at the end
+        still = _orthonormal(np.linalg.solve(turn, still))
+    return np.linalg.svd(still)[0][:, still.shape[1] :]
+
+
+def _kernel(matrix: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of what a matrix maps to 0, one column each."""
+    _, values, rows = np.linalg.svd(matrix)
+    rank = int((values > _SINGULAR).sum())
+    return rows[rank:].T
+
+
 def _is_regular(x: np.ndarray) -> bool:
     """Whether the columns are independent, in an orthonormal basis of the plane."""
-    return bool(np.linalg.svd(x, compute_uv=False)[-1] > _SINGULAR)
+    return bool(np.linalg.svd(x, compute_uv=False).min(initial=np.inf) > _SINGULAR)
 
 
 def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
@@ -85,8 +111,8 @@ def _turns_over(x: np.ndarray, before: np.ndarray, in_x: np.ndarray) -> bool:
     eigenvalues of E + B S, all positive exactly where no direction has turned over. Unlike the
     sign of det X they also tell when two turn over at once.
     """
-    turned = np.linalg.solve(in_x, before @ np.linalg.inv(x))
-    return bool(np.linalg.eigvals(turned).real.min() <= 0.0)
+    turned = np.linalg.lstsq(x, np.linalg.solve(in_x, before), rcond=None)[0]
+    return bool(np.linalg.eigvals(turned).real.min(initial=np.inf) <= 0.0)
 
 
 def concave_at(
@@ -142,13 +168,23 @@ def _tangent_curvature(
     mu: np.ndarray,
     schedule: ShootingSchedule,
 ) -> SecondOrder:
-    """The cost-to-go must curve upwards along the start manifold."""
+    """The cost-to-go must curve upwards along the start manifold, where the start is free at all.
+
+    Variations of the start are dx = X c with c such that dx is tangent to the manifold; their
+    second variation is dx' Y c, and what the manifold bends.
+    """
     nx, m = extremals.shape.nx, extremals.shape.n_mu
-    riccati = plane[nx:] @ np.linalg.inv(plane[:nx])
     _, in_z, _ = extremals.starts(z0, mu, schedule.t0, schedule.p_first)
     normals, bending = in_z[:m, :nx], in_z[m:, :nx]
-    tangent = np.linalg.svd(normals)[2][m:].T
-    hessian = tangent.T @ (riccati + bending) @ tangent
-    if hessian.size and np.linalg.eigvalsh((hessian + hessian.T) / 2)[0] <= 0.0:
+    tangent = np.linalg.svd(normals)[2][m:]
+    across = np.eye(nx) - tangent.T @ tangent
+    admitted = plane @ _kernel(across @ plane[:nx])
+    _, values, rows = np.linalg.svd(admitted[:nx])
+    free = admitted @ rows[: len(values)][values > _SINGULAR].T
+    if not free.size:
+        return SecondOrder(True)
+    dx, dy = free[:nx] / values[values > _SINGULAR], free[nx:] / values[values > _SINGULAR]
+    hessian = dx.T @ dy + dx.T @ bending @ dx
+    if np.linalg.eigvalsh((hessian + hessian.T) / 2)[0] <= 0.0:
         return SecondOrder(False, "the cost does not curve upwards along the start manifold")
     return SecondOrder(True)

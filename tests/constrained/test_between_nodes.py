@@ -2,12 +2,24 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from benchmarks.cases import arm_scenario, required_clearance, soft_optimum
 from models.textbook import discrete_double_integrator
-from ocp import Box, ProblemError, Status, UnsupportedProblem, evaluate, solve
+from ocp import (
+    OCP,
+    RK4,
+    Box,
+    Constraint,
+    Model,
+    ProblemError,
+    Status,
+    UnsupportedProblem,
+    evaluate,
+    solve,
+)
 from solvers import BetweenNodes, MultipleShooting, Schuetz
 from tests.constrained.test_augmented_lagrangian import ceiling_cost, under_a_ceiling
 from tests.solvers.problems import point
@@ -55,6 +67,42 @@ def test_infeasible_stays_infeasible() -> None:
     solution = solve(ocp, BetweenNodes(MultipleShooting(30)))
     assert solution.status is Status.INFEASIBLE
     assert "'clearance' is violated by 0.09" in solution.message
+
+
+def swing_up() -> OCP:
+    """A pendulum to its upper rest in 3 s, at a speed that is limited."""
+    angle, rate, torque = (ca.SX.sym(name) for name in ("angle", "rate", "torque"))
+    x = ca.vertcat(angle, rate)
+    f = ca.vertcat(rate, -9.81 * ca.sin(angle) + torque)
+    top = [np.pi, 0.0]
+    return OCP(
+        name="swing-up",
+        model=Model(name="pendulum", x=x, u=torque, f=f),
+        x0=[0.0, 0.0],
+        horizon=3.0,
+        running_cost=torque**2,
+        constraints=(
+            Constraint("end", x, top, top, at="terminal"),
+            Constraint("speed", rate, -6.0, 6.0),
+        ),
+    )
+
+
+def test_an_end_that_drifts_by_the_integrator_is_inaccurate() -> None:
+    coarse = solve(swing_up(), BetweenNodes(MultipleShooting(10)))
+    assert coarse.status is Status.INACCURATE
+    assert "the integrator is too coarse on 40 intervals" in coarse.message
+    assert evaluate(coarse).violation > 1e-4
+
+
+def test_the_intervals_are_halved_before_it_gives_up() -> None:
+    ocp = swing_up()
+    solution = solve(ocp, BetweenNodes(MultipleShooting(40, RK4(4)), tolerance=1e-5))
+    assert solution.status is Status.SOLVED
+    coarser = solve(ocp, BetweenNodes(MultipleShooting(30), tolerance=1e-4))
+    assert coarser.status is Status.SOLVED
+    assert len(coarser.t) > 31
+    assert evaluate(coarser).violation <= 1e-4
 
 
 def test_what_is_refused() -> None:

@@ -172,7 +172,7 @@ def test_without_rescue_a_failure_is_what_the_backend_says() -> None:
     make, *_ = INFEASIBLE["unreachable end"]
     quick = solve(make(), MultipleShooting(20, feasibility_restoration=False))
     assert quick.status is Status.FAILED
-    assert "Infeasible_Problem_Detected" in quick.message
+    assert "a point where the constraints' violation is least, not zero" in quick.message
     thorough = solve(make(), MultipleShooting(20))
     assert thorough.status is Status.INFEASIBLE
     assert quick.iterations < thorough.iterations
@@ -211,7 +211,9 @@ def test_arm_034_cannot_keep_clear(backend) -> None:
     scenario = arm_scenario("arm-034")
     solution = solve(scenario.ocp(clearance=0.2), MultipleShooting(75, backend=backend))
     assert solution.status is Status.INFEASIBLE
-    match = re.fullmatch(r"'clearance' is violated by (\S+) at t = (\S+) s", solution.message)
+    match = re.fullmatch(
+        r"constraint 'clearance' is violated by (\S+) at t = (\S+) s", solution.message
+    )
     assert match, solution.message
     # The best that can be done is the path's own distance.
     assert float(match[1]) == pytest.approx(0.2 - scenario.path_clearance, abs=2e-3)

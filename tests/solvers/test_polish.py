@@ -2,13 +2,24 @@
 
 import re
 import sys
+from dataclasses import replace
 from math import inf, nan
 from typing import Any, cast
 
 import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, arm_cases
-from ocp import ProblemError, Solution, Status, evaluate, solve
+from models.textbook import van_der_pol
+from ocp import (
+    Box,
+    Constraint,
+    ProblemError,
+    Solution,
+    Status,
+    UnsupportedProblem,
+    evaluate,
+    solve,
+)
 from solvers import IndirectShooting, MultipleShooting, polish
 from solvers.indirect.indirect_shooting import IndirectShootingProgram
 from solvers.indirect.second_order import SecondOrder
@@ -133,3 +144,21 @@ def test_what_is_no_solution_is_refused_by_name() -> None:
         polish(ocp)
     with pytest.raises(ProblemError, match="polish: solver is a MultipleShooting"):
         polish(solve(ocp, MultipleShooting(20)), solver=cast("Any", MultipleShooting()))
+
+
+def test_inequalities_that_do_not_act_are_left_out_and_named() -> None:
+    ocp = van_der_pol()
+    far = Constraint("far", ocp.model.x[0] + ocp.model.u, -9.0, 9.0)
+    wide = replace(ocp, state_bounds=Box(-5.0, 5.0), constraints=(*ocp.constraints, far))
+    polished = polish(solve(wide, MultipleShooting(75)))
+    exact = polish(solve(ocp, MultipleShooting(75)))
+    assert polished.status is Status.SOLVED
+    assert polished.problem is wide
+    assert polished.cost == pytest.approx(exact.cost, rel=1e-10)
+    assert polished.message == "polished without 'far', state bounds, which do not act"
+
+
+def test_inequalities_that_act_are_refused() -> None:
+    ocp = replace(van_der_pol(), state_bounds=Box(-0.2, 5.0))
+    with pytest.raises(UnsupportedProblem, match="state bounds"):
+        polish(solve(ocp, MultipleShooting(75)))

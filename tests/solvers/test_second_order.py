@@ -119,3 +119,44 @@ def test_a_conjugate_point_on_a_node_is_seen(duration: float, fixed_end: bool) -
     _, verdict = judged(ocp)
     assert verdict.passed is False
     assert verdict.reason.startswith("conjugate point")
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0, 1e-3])
+def test_the_scale_of_a_terminal_equation_does_not_matter(scale: float) -> None:
+    """A copy p of the start that the end fixes: nothing is left free at the start."""
+    x, p, u = ca.SX.sym("x"), ca.SX.sym("p"), ca.SX.sym("u")
+    ocp = OCP(
+        name="linked",
+        model=Model(name="linked", x=ca.vertcat(x, p), u=u, f=ca.vertcat(u, 0)),
+        x0=[1.0, 1.0],
+        horizon=1.0,
+        running_cost=x**2 + u**2,
+        constraints=(
+            Constraint("copy", x - p, 0, 0, at="initial"),
+            Constraint("p", scale * (p - 1), 0, 0, at="terminal"),
+        ),
+    )
+    polished = polish(solve(ocp, MultipleShooting(100)))
+    assert polished.status is Status.SOLVED
+    assert polished.cost == pytest.approx(np.tanh(1.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("duration", "passes"), [(2.0, True), (3.0, True), (3.3, False)])
+def test_a_state_that_only_the_end_fixes_hides_no_conjugate_point(
+    duration: float, passes: bool
+) -> None:
+    """a = 0 is the minimum up to pi; w is constant, free at the start and given at the end."""
+    a, w, b = ca.SX.sym("a"), ca.SX.sym("w"), ca.SX.sym("b")
+    ocp = OCP(
+        name="pinned",
+        model=Model(name="pinned", x=ca.vertcat(a, w), u=b, f=ca.vertcat(w * b, 0)),
+        x0=[0.0, 1.0],
+        horizon=duration,
+        running_cost=w * (b**2 - a**2) / 2,
+        constraints=(
+            Constraint("from", a, 0, 0, at="initial"),
+            Constraint("to", ca.vertcat(a, w), [0, 1], [0, 1], at="terminal"),
+        ),
+    )
+    _, verdict = judged(ocp)
+    assert verdict.passed is passes

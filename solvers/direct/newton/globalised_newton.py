@@ -1,6 +1,6 @@
 """Newton's method with a line search: step lengths, shifts of the Hessian, when to stop."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,14 @@ class NewtonOutcome:
     residuals: np.ndarray
     evaluations: int
     riccati_solves: int
+
+    def after(self, earlier: "NewtonOutcome") -> "NewtonOutcome":
+        """Return this outcome with the work of an earlier one."""
+        return replace(
+            self,
+            evaluations=self.evaluations + earlier.evaluations,
+            riccati_solves=self.riccati_solves + earlier.riccati_solves,
+        )
 
 
 @dataclass(eq=False)

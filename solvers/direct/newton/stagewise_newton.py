@@ -14,6 +14,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
+from solvers.direct.first_trajectory import OTHER_STATES, FirstStates
 from solvers.direct.newton.globalised_newton import GlobalisedNewton, NewtonOutcome
 from solvers.direct.newton.newton_step import Iterate, NewtonStep
 from solvers.direct.shooting_grid import ShootingGrid
@@ -122,7 +123,9 @@ class StagewiseNewtonProgram(MethodProgram):
         newton = GlobalisedNewton(
             self.step, stages_and_end, solver.tolerance, solver.max_iterations
         )
-        outcome = newton.solve(self._first_iterate(data, guess))
+        outcome = newton.solve(self._first_iterate(data, guess, "tame"))
+        if outcome.status is Status.DIVERGED:
+            outcome = self._solve_from_others(newton, outcome, data, guess)
         last = outcome.linearisation
         t = data.t0 + self.grid.fractions * ocp.duration
         status, message = self._check_accuracy(outcome, schedule, t)
@@ -151,10 +154,32 @@ class StagewiseNewtonProgram(MethodProgram):
                 return Status.INACCURATE, f"a state moves by {error:.2g} at t = {t[node]:.4g} s"
         return outcome.status, outcome.message
 
-    def _first_iterate(self, data: RunData, guess: InitialGuess | None) -> Iterate:
+    def _solve_from_others(
+        self,
+        newton: GlobalisedNewton,
+        failed: NewtonOutcome,
+        data: RunData,
+        guess: InitialGuess | None,
+    ) -> NewtonOutcome:
+        """Solve from the start held and from the roll-out, until one succeeds."""
+        begun = [self._first_iterate(data, guess, "tame").x]
+        for source in OTHER_STATES:
+            first = self._first_iterate(data, guess, source)
+            if any(np.array_equal(first.x, x) for x in begun):
+                continue
+            begun.append(first.x)
+            outcome = newton.solve(first)
+            if outcome.status.is_success:
+                return outcome.after(failed)
+            failed = failed.after(outcome)
+        return failed
+
+    def _first_iterate(
+        self, data: RunData, guess: InitialGuess | None, source: FirstStates
+    ) -> Iterate:
         """Return the guess with x0 at the start; costates that it lacks are zero."""
         ocp, nodes = self.grid.ocp, self.grid.fractions
-        x, u = self.grid.first_iterate(data, guess, ocp.duration)
+        x, u = self.grid.first_iterate(data, guess, ocp.duration, source)
         costate = guess.sample("costate", nodes, ocp.model.nx) if guess else None
         if costate is None:
             costate = np.zeros_like(x)
