@@ -2,6 +2,8 @@
 
 from ocp.checks.arguments import (
     check_callable,
+    check_choice,
+    check_flag,
     check_instance,
     check_not_negative,
     check_numbers,
@@ -45,6 +47,8 @@ __all__ = [
     "bernstein",
     "c_code",
     "check_callable",
+    "check_choice",
+    "check_flag",
     "check_instance",
     "check_not_negative",
     "check_numbers",

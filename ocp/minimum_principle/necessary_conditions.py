@@ -86,6 +86,8 @@ def minimum_principle(ocp: OCP) -> MinimumPrinciple:
 def _require_regular(ocp: OCP, h: Hamiltonian) -> None:
     """Refuse a Hamiltonian that does not determine the control."""
     m = ocp.model
+    if m.nu == 0:  # nothing to determine
+        return
     for i, name in enumerate(m.u_names):
         if h.expressions.curvature[i, :].nnz() == 0:
             raise UnsupportedProblem(

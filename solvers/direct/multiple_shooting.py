@@ -12,6 +12,7 @@ from ocp.internal import (
     RunData,
     RunResult,
     Transcription,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -65,6 +66,8 @@ class MultipleShooting(Solver):
         check_whole(self.intervals, "multiple shooting: intervals")
         check_instance(self.integrator, Integrator, "multiple shooting: integrator")
         check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)
+        check_flag(self.compiled, "multiple shooting: compiled")
+        check_flag(self.feasibility_restoration, "multiple shooting: feasibility_restoration")
         self.nlp_backend.check()
 
     @property

@@ -10,7 +10,6 @@ from ocp import (
     RK4,
     InitialGuess,
     Integrator,
-    ProblemError,
     Solution,
     Solver,
     UnsupportedProblem,
@@ -20,6 +19,8 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    check_choice,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -80,10 +81,9 @@ class IndirectShooting(Solver):
         if self.continuation is not None:
             kinds = (HorizonContinuation, ParameterContinuation)
             check_instance(self.continuation, kinds, "indirect shooting: continuation")
-        if self.jacobian not in ("exact", "finite-difference"):
-            raise ProblemError(
-                f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
-            )
+        check_choice(self.jacobian, ("exact", "finite-difference"), "indirect shooting: jacobian")
+        check_flag(self.damped, "indirect shooting: damped")
+        check_flag(self.compiled, "indirect shooting: compiled")
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "IndirectShooting":
         """Set what is left open; see ``Solver``."""

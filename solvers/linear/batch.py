@@ -7,7 +7,15 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ocp import OCP, InitialGuess, Solver, Status, Work, linear_quadratic
-from ocp.internal import LinearQuadratic, LQData, Matrices, MethodProgram, RunData, RunResult
+from ocp.internal import (
+    LinearQuadratic,
+    LQData,
+    Matrices,
+    MethodProgram,
+    RunData,
+    RunResult,
+    check_flag,
+)
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.stacked_prediction import StackedPrediction
 
@@ -31,6 +39,10 @@ class Batch(Solver):
     """
 
     prestabilise: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the option."""
+        check_flag(self.prestabilise, "Batch: prestabilise")
 
     def build(self, ocp: OCP) -> "BatchProgram":
         """Stack and factorise."""

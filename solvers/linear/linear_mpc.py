@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, ProblemError, Solver, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, Solver, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,
@@ -13,6 +13,7 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    check_choice,
     check_positive,
     start_violation,
 )
@@ -61,8 +62,7 @@ class LinearMPC(Solver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.form not in _FORMS:
-            raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
+        check_choice(self.form, _FORMS, "LinearMPC: form")
         check_positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")

@@ -9,14 +9,13 @@ import numpy as np
 from ocp import (
     OCP,
     InitialGuess,
-    ProblemError,
     Solver,
     Status,
     Work,
     linear_quadratic,
     with_stationary_end,
 )
-from ocp.internal import LinearQuadratic, MethodProgram, RunData, RunResult
+from ocp.internal import LinearQuadratic, MethodProgram, RunData, RunResult, check_choice
 from solvers.linear import regulator_gains as recursion
 
 
@@ -40,10 +39,7 @@ class Riccati(Solver):
 
     def __post_init__(self) -> None:
         """Check the option."""
-        if self.horizon not in ("finite", "infinite"):
-            raise ProblemError(
-                f"Riccati: horizon = {self.horizon!r} is neither finite nor infinite"
-            )
+        check_choice(self.horizon, ("finite", "infinite"), "Riccati: horizon")
 
     def build(self, ocp: OCP) -> "RiccatiProgram":
         """Read the matrices; where they are constant, do the recursion."""

@@ -86,6 +86,7 @@ class GridDP(Solver):
     def __post_init__(self) -> None:
         """Check the options."""
         check_whole(self.intervals, "GridDP: intervals")
+        check_instance(self.integrator, Integrator, "GridDP: integrator")
         for name in ("terminal_slack", "accuracy", "memory"):
             check_not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
 

@@ -25,7 +25,12 @@ def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, u = subject.ocp, subject.trial.u
     nothing = ocp.control_bounds.clip(np.zeros_like(u))
     at_end = bool(ocp.at("terminal"))
-    if at_end or ocp.has_free_time or np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max()):
+    if (
+        at_end
+        or not u.size
+        or ocp.has_free_time
+        or np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max())
+    ):
         return
     yield Finding(
         Cause.NO_GOAL,

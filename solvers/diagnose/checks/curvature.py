@@ -74,6 +74,8 @@ def _linear_in(subject: DiagnosedProblem, name: str, slope: float) -> Finding:
 
 def _concave_control(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, m = subject.ocp, subject.ocp.model
+    if not m.nu:
+        return
     hessian = ca.hessian(ca.SX(ocp.running_cost), m.u)[0]
     points = subject.along + subject.around
     values = points.evaluate(ocp, hessian).reshape(-1, m.nu, m.nu)

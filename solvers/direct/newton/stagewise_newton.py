@@ -9,6 +9,7 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -67,8 +68,9 @@ class StagewiseNewton(Solver):
         check_whole(self.intervals, "stagewise Newton: intervals")
         check_whole(self.max_iterations, "stagewise Newton: max_iterations")
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")
-        for name in ("tolerance", "accuracy"):
-            check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
+        check_positive(self.tolerance, "stagewise Newton: tolerance")
+        check_positive(self.accuracy, "stagewise Newton: accuracy", finite=False)
+        check_flag(self.compiled, "stagewise Newton: compiled")
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
         """Set what is left open; see ``Solver``."""
@@ -85,6 +87,8 @@ class StagewiseNewton(Solver):
 
 
 def _refuse(ocp: OCP) -> None:
+    if not ocp.model.nu:
+        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton needs a control, there is none")
     for c in ocp.constraints:
         raise UnsupportedProblem(
             f"{ocp.name}: stagewise Newton takes no {c.at} constraint ('{c.name}')"
