@@ -26,6 +26,7 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.start_feasibility import start_violation
+from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.method_program import MethodProgram, RunResult
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
@@ -33,6 +34,7 @@ __all__ = [
     "BufferedFunction",
     "ConstraintRow",
     "ConstraintRows",
+    "Jump",
     "LQData",
     "LinearQuadratic",
     "Matrices",
@@ -60,6 +62,7 @@ __all__ = [
     "elevated",
     "hamiltonian",
     "interpolate",
+    "jumps_along",
     "most_violated",
     "stage_hessian",
     "start_violation",
