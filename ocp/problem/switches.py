@@ -44,7 +44,7 @@ def switches(ocp: OCP) -> Switches | None:
     terms = [m.f, ca.SX(ocp.running_cost), *[c.expression for c in ocp.at("path")]]
     inputs, varying = [m.x, m.u, m.t, ocp.p], ca.vertcat(m.x, m.u)
     found: dict[int, tuple[ca.SX, str]] = {}
-    for node in _operations(ca.vertcat(*terms)):
+    for node in operations(ca.vertcat(*terms)):
         level = _level(node)
         if level is not None and ca.depends_on(level, varying):
             found.setdefault(node.element_hash(), (level, readable(node)))
@@ -80,7 +80,7 @@ def _level(node: ca.SX) -> ca.SX | None:
     return None
 
 
-def _operations(expression: ca.SX) -> Iterator[ca.SX]:
+def operations(expression: ca.SX) -> Iterator[ca.SX]:
     """Yield every operation in an expression once."""
     seen: set[int] = set()
     stack = ca.vertsplit(expression)

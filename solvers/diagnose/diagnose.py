@@ -18,7 +18,7 @@ from solvers.diagnose.checks.guess import guess
 from solvers.diagnose.checks.infeasible import infeasible
 from solvers.diagnose.checks.influence import influence
 from solvers.diagnose.checks.instants import instants
-from solvers.diagnose.checks.kink import kink
+from solvers.diagnose.checks.kink import declared_kinks, kink
 from solvers.diagnose.checks.not_finite import not_finite
 from solvers.diagnose.checks.scaling import scaling
 from solvers.diagnose.checks.time_kind import time_kind
@@ -89,7 +89,7 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     with np.errstate(all="ignore"):  # checks report what is not finite; no warnings
         findings = [finding for check in _BEFORE for finding in check(subject)]
         findings = _tested(subject, findings)
-        if not any(f.severity is Severity.ERROR for f in findings):
+        if not any(_explains(f) for f in findings):
             findings += [finding for check in _AFTER for finding in check(subject)]
             findings += _unsolved(subject, findings)
         findings = _tested(subject, findings)
@@ -117,10 +117,20 @@ def _tested(subject: DiagnosedProblem, findings: list[Finding]) -> list[Finding]
     ]
 
 
+def _explains(finding: Finding) -> bool:
+    """Whether a trial would only show consequences: after an error, on a hopeless grid."""
+    hopeless = finding.cause is Cause.COARSE_GRID and finding.severity is Severity.WARNING
+    return finding.severity is Severity.ERROR or hopeless
+
+
 def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Finding]:
     """Return that the trial failed, where no finding explains it."""
     trial = subject.trial
     if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
+        return
+    kinks = list(declared_kinks(subject))
+    yield from kinks
+    if kinks:
         return
     yield Finding(
         Cause.UNSOLVED,
