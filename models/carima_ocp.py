@@ -117,18 +117,19 @@ class _Layout:
 
     def next(self, x: ca.SX, du: ca.SX) -> ca.SX:
         """Return the state after one step with increment du and no new noise."""
-        y, past, e = ca.vertsplit(
-            x[:-1],
-            [0, self.outputs, self.outputs + self.increments, self.size - 1],
-        )
+        entries = ca.vertsplit(x)
+        y, rest = entries[: self.outputs], entries[self.outputs : -1]
+        past, e = rest[: self.increments], rest[self.increments :]
         a, model = np.convolve(self.model.a, [1.0, -1.0]), self.model
-        recent = ca.vertcat(du, past)
+        recent = [du, *past]
         delayed = recent[model.delay : model.delay + len(model.b)]
-        y_next = -ca.dot(ca.DM(a[1:]), y) + ca.dot(ca.DM(list(model.b)), delayed)
+        y_next = -ca.dot(ca.DM(a[1:]), ca.vertcat(*y))
+        y_next += ca.dot(ca.DM(list(model.b)), ca.vertcat(*delayed))
         if self.noises:
-            y_next += ca.dot(ca.DM(list(model.c[1:])), e)
-        e_next = ca.vertcat(0, e[:-1]) if self.noises else e
-        return ca.vertcat(y_next, y[:-1], recent[: self.increments], e_next, x[-1] + du)
+            y_next += ca.dot(ca.DM(list(model.c[1:])), ca.vertcat(*e))
+        e_next = [ca.SX(0), *e[:-1]] if self.noises else []
+        # Lists, since CasADi slices a single symbol to a row (1, 0), which stacks as a row more.
+        return ca.vertcat(y_next, *y[:-1], *recent[: self.increments], *e_next, entries[-1] + du)
 
     def state(self, outputs: ArrayLike, inputs: ArrayLike, noise: ArrayLike) -> np.ndarray:
         """Return the state of what was measured."""

@@ -21,6 +21,7 @@ from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.record_format import Record, records
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.guess import Guess
+from ocp.problem.kinks import without_kinks
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP, FreeTime
 from ocp.problem.parameters import Parameter, Signal
@@ -86,4 +87,5 @@ __all__ = [
     "with_input_rate",
     "with_stationary_end",
     "with_terminal_set",
+    "without_kinks",
 ]

@@ -2,6 +2,8 @@
 
 from ocp.checks.arguments import (
     check_callable,
+    check_choice,
+    check_flag,
     check_instance,
     check_not_negative,
     check_numbers,
@@ -36,6 +38,7 @@ from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
 from ocp.referee.integrate_controls import segment_gaps
+from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 
 __all__ = [
@@ -43,6 +46,7 @@ __all__ = [
     "BufferedFunction",
     "ConstraintRow",
     "ConstraintRows",
+    "Jump",
     "LQData",
     "LinearQuadratic",
     "Matrices",
@@ -62,6 +66,8 @@ __all__ = [
     "bernstein",
     "c_code",
     "check_callable",
+    "check_choice",
+    "check_flag",
     "check_instance",
     "check_not_negative",
     "check_numbers",
@@ -76,6 +82,7 @@ __all__ = [
     "in_own_units",
     "interpolate",
     "judged",
+    "jumps_along",
     "most_violated",
     "scaled",
     "segment_gaps",

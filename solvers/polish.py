@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from ocp import Solution, Status, UnsupportedProblem, Work, evaluate
+from ocp import Solution, Status, UnsupportedProblem, evaluate
 from ocp.internal import (
     ACCURACY,
     check_instance,
@@ -14,17 +14,14 @@ from ocp.internal import (
 )
 from solvers.constrained.inactive_bounds import without_inactive
 from solvers.direct.multiple_shooting import MultipleShooting
-from solvers.indirect.indirect_shooting import IndirectShooting, IndirectShootingProgram
-from solvers.indirect.step_halving import change_when_halved, finer
+from solvers.indirect.indirect_shooting import IndirectShooting
+from solvers.indirect.step_halving import halved_until_still, joined, run_from
 
 SEGMENTS, STEPS = 15, 300
-_MOST_STEPS = 2**16
 # Newton that fails from a held control of N intervals starts again from one of this many times N.
 _FINER = 4
 # But not of more: an extremal given again has steps by the thousand, which are no intervals.
 _MOST_INTERVALS = 600
-# The cost is flat about an optimum: where it holds to some accuracy, states may move by more.
-_STATE = 100.0
 # Larger violations of what was left out count.
 _VIOLATED = 1e-6
 
@@ -89,44 +86,16 @@ def _polished(solution: Solution, solver: IndirectShooting, accuracy: float) -> 
     started = perf_counter()
     program = solver.unjudged().prepare(solution.problem)
     built = perf_counter()
-    result = _newton(program, solution)
+    result = run_from(program, solution)
     if not result.status.is_success:
-        result = _joined(result, _newton(program, _on_finer_grid(solution)))
-    result, program = _refined(result, program, accuracy)
+        result = joined(result, run_from(program, _on_finer_grid(solution)))
+    result, program = halved_until_still(result, program, accuracy)
     if result.status is Status.STATIONARY:
         verdict = program.second_order(result)
         status = Status.SOLVED if verdict.passed else Status.STATIONARY
         result = result.with_(status=status, message=verdict.reason)
     result = result.with_(build_time=built - started, solve_time=perf_counter() - built)
     return judged(result, ACCURACY)
-
-
-def _refined(
-    result: Solution, program: IndirectShootingProgram, accuracy: float
-) -> tuple[Solution, IndirectShootingProgram]:
-    """Double the steps until cost and states hold still, or say by how much they do not."""
-    while result.status.is_success:
-        half = finer(program)
-        moved = change_when_halved(result, program, half)
-        result = result.with_(work=result.work + Work(rollouts=2))
-        relative = moved.cost / (1.0 + abs(result.cost))
-        if relative <= accuracy and moved.state <= _STATE * accuracy:
-            break
-        said = f"half of its {program.solver.steps} steps would change the cost by {moved.cost:.1e}"
-        said = f"{said}, a state by {moved.state:.1e}"
-        if half.solver.steps > _MOST_STEPS:
-            return result.with_(status=Status.INACCURATE, message=said), program
-        again = _joined(result, _newton(half, result))
-        if not again.status.is_success:
-            said = f"{said}; with {half.solver.steps}: {again.status.name}, {again.message}"
-            return result.with_(status=Status.INACCURATE, message=said), program
-        result, program = again, half
-    return result, program
-
-
-def _newton(program: IndirectShootingProgram, guess: Solution) -> Solution:
-    data = guess.data
-    return program.run(x0=data.x0, t0=data.t0, parameters=guess.parameters, guess=guess)
 
 
 def _on_finer_grid(solution: Solution) -> Solution:
@@ -136,8 +105,3 @@ def _on_finer_grid(solution: Solution) -> Solution:
     data, program = solution.data, coarse.build(solution.problem)
     finer_grid = program.run(x0=data.x0, t0=data.t0, parameters=solution.parameters, guess=solution)
     return finer_grid if finer_grid.status.is_success else solution
-
-
-def _joined(first: Solution, then: Solution) -> Solution:
-    """Return the second solution with the effort of both."""
-    return then.with_(iterations=first.iterations + then.iterations, work=first.work + then.work)

@@ -1,17 +1,59 @@
 """Checks of what a user gives, in words that name what is wrong."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.errors import ProblemError
 
+# More stages, steps or iterations than this are a mistake; larger numbers overflow elsewhere.
+_MOST = 2**31 - 1
+
 
 def check_numeric(values: ArrayLike, what: str) -> np.ndarray:
-    """Return ``values`` as a new float array, or raise ``ProblemError``."""
+    """Return ``values`` as a new float array, or raise ``ProblemError``.
+
+    Text, truth values, complex numbers and arrays with masked entries are refused: NumPy would
+    convert some of them silently.
+    """
+    if np.ma.is_masked(values):
+        raise ProblemError(f"{what} has masked entries; fill or leave them out")
     try:
-        return np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"{what} is not numeric: {values!r}") from error
+        given = np.asarray(values)
+        numeric = given.dtype.kind in "fiu" or (given.dtype.kind == "O" and not _has_other(given))
+        # NumPy makes 1 of a True beside numbers: a list is looked through.
+        if numeric and not (isinstance(values, list | tuple) and _has_other(_flat(values))):
+            return np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ProblemError(f"{what} is not numeric: {_shown(values)}") from error
+    raise ProblemError(f"{what} is not numeric: {_shown(values)}")
+
+
+def _has_other(values: np.ndarray) -> bool:
+    """Whether an array of objects holds a truth value or a text."""
+    return any(isinstance(v, bool | np.bool_ | str | bytes | complex) for v in values.flat)
+
+
+def _flat(values: list | tuple) -> np.ndarray:
+    """Return the numbers of nested lists as they are, as an array of objects."""
+    found: list[object] = []
+    for value in values:
+        found.extend(_flat(value) if isinstance(value, list | tuple) else [value])
+    flat = np.empty(len(found), dtype=object)
+    flat[:] = found
+    return flat
+
+
+def _shown(value: object) -> str:
+    """Return a value as a message shows it: Python refuses to write very long numbers."""
+    if isinstance(value, int) and abs(value) > 10**20:
+        return "a number that is too large"
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a number that is too large"
+    return text if len(text) <= 200 else f"{text[:200]}..."
 
 
 def check_whole(value: object, what: str, *, least: int = 1) -> int:
@@ -25,9 +67,34 @@ def check_whole(value: object, what: str, *, least: int = 1) -> int:
     Raises:
         ProblemError: otherwise, and for a bool or a float, naming ``what``.
     """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ProblemError(f"{what} must be a whole number of at least {least}, not {value!r}")
-    return int(value)
+    number = least - 1
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        number = int(value)
+    if not least <= number <= _MOST:
+        raise ProblemError(
+            f"{what} must be a whole number of at least {least}, not {_shown(value)}"
+        )
+    return number
+
+
+def check_choice(value: object, choices: Iterable[str], what: str) -> None:
+    """Check that ``value`` is one of some words, or raise ``ProblemError``."""
+    known = list(choices)
+    if not isinstance(value, str) or value not in known:
+        *others, last = known
+        said = (
+            f"neither {' nor '.join(known)}"
+            if len(known) == 2
+            else (f"none of {', '.join(others)} and {last}")
+        )
+        raise ProblemError(f"{what} = {_shown(value)} is {said}")
+
+
+def check_flag(value: object, what: str) -> bool:
+    """Return ``value`` if it is True or False, or raise ``ProblemError``."""
+    if not isinstance(value, bool | np.bool_):
+        raise ProblemError(f"{what} is {_shown(value)}, True or False is needed")
+    return bool(value)
 
 
 def check_positive(
@@ -43,7 +110,7 @@ def check_positive(
     """
     number = _number(value, finite, below)
     if not number > 0.0:
-        raise ProblemError(f"{what} = {value!r}, it must be positive{_limit(finite, below)}")
+        raise ProblemError(f"{what} = {_shown(value)}, it must be positive{_limit(finite, below)}")
     return number
 
 
@@ -53,7 +120,7 @@ def check_not_negative(
     """Return ``value`` if it is one number, 0 or more; else as ``positive``."""
     number = _number(value, finite, below)
     if not number >= 0.0:
-        raise ProblemError(f"{what} = {value!r}, it must be 0 or more{_limit(finite, below)}")
+        raise ProblemError(f"{what} = {_shown(value)}, it must be 0 or more{_limit(finite, below)}")
     return number
 
 
@@ -61,14 +128,19 @@ def check_real(value: object, what: str) -> float:
     """Return ``value`` if it is one finite number; else as ``positive``."""
     number = _number(value, True, np.inf)
     if not number > -np.inf:
-        raise ProblemError(f"{what} = {value!r}, a finite number is needed")
+        raise ProblemError(f"{what} = {_shown(value)}, a finite number is needed")
     return number
 
 
 def _number(value: object, finite: bool, below: float) -> float:
     """Return one number below a limit as it is, anything else as NaN."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
-    number = float(value) if is_number and not isinstance(value, bool) else np.nan
+    if not is_number or isinstance(value, bool):
+        return np.nan
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond all floats
+        return np.nan
     return number if number < below or (number == np.inf and not finite) else np.nan
 
 

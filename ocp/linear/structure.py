@@ -49,6 +49,8 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
         raise UnsupportedProblem(
             f"{ocp.name}: the model is continuous in time; make it discrete: discretise(ocp, dt)"
         )
+    if not ocp.model.nu:
+        raise UnsupportedProblem(f"{ocp.name}: the linear solvers need a control, there is none")
     if ocp.has_free_start:
         raise UnsupportedProblem(
             f"{ocp.name}: initial constraint '{ocp.at('initial')[0].name}': "

@@ -13,6 +13,7 @@ from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
+from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution, Work
 from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
@@ -82,9 +83,16 @@ class MethodProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
+        if self._differentiates and (jumped := _across_a_jump(solution)):
+            return jumped
         if not self.solver.judged:
             return solution
         return judged(solution, self.solver.success_accuracy, slack=self.solver.end_slack)
+
+    @property
+    def _differentiates(self) -> bool:
+        """Whether the method uses derivatives along the trajectory."""
+        return True
 
     @abstractmethod
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
@@ -102,3 +110,11 @@ class MethodProgram(Program):
     @cached_property
     def _solver_text(self) -> str:
         return repr(self.solver)
+
+
+def _across_a_jump(solution: Solution) -> Solution | None:
+    """Return a success that crosses a jump, which derivatives miss, as INACCURATE."""
+    jumps = jumps_along(solution) if solution.status.is_success else ()
+    if not jumps:
+        return None
+    return solution.with_(status=Status.INACCURATE, message=str(jumps[0]))

@@ -13,6 +13,7 @@ from ocp.minimum_principle.minimising_control import minimising_control
 from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Constraint
 from ocp.problem.functions import stacked
+from ocp.problem.kinks import kink_in_control
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
 
@@ -86,12 +87,19 @@ def minimum_principle(ocp: OCP) -> MinimumPrinciple:
 def _require_regular(ocp: OCP, h: Hamiltonian) -> None:
     """Refuse a Hamiltonian that does not determine the control."""
     m = ocp.model
+    if m.nu == 0:  # nothing to determine
+        return
     for i, name in enumerate(m.u_names):
         if h.expressions.curvature[i, :].nnz() == 0:
             raise UnsupportedProblem(
                 f"{ocp.name}: the Hamiltonian is linear in the control {name}: its minimum is "
                 "bang-bang or singular; use a direct method"
             )
+    if kink := kink_in_control(ocp):
+        raise UnsupportedProblem(
+            f"{ocp.name}: the Hamiltonian has a kink in a control, in {kink}, where its minimum "
+            "is no zero of H_u; use a direct method, or without_kinks(problem)"
+        )
     hessians = _probed_curvatures(ocp, h)
     scales = [_SINGULAR * (1.0 + np.abs(a).max()) for a in hessians]
     if all(np.linalg.matrix_rank(a, tol=s) < m.nu for a, s in zip(hessians, scales, strict=True)):

@@ -52,4 +52,5 @@ class Guess:
         if len(rows) == 1:
             return np.repeat(rows, len(fractions), axis=0)
         nodes = np.linspace(0.0, 1.0, len(rows))
-        return np.stack([np.interp(fractions, nodes, c) for c in rows.T], axis=1)
+        columns = [np.interp(fractions, nodes, c) for c in rows.T]
+        return np.array(columns).reshape(width, len(fractions)).T

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
-from ocp.checks.arguments import check_instance
+from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
@@ -197,15 +197,17 @@ class Solution:
 
         Interpolated linearly; for an extremal by cubics with the slopes of its canonical flow.
         """
+        times = _instants(t, "state")
         if self.control_kind == "extremal":
-            return self._canonical(t)[..., : self.problem.model.nx]
-        return _interpolate(np.asarray(t, dtype=float), self.t, self.x)
+            return self._canonical(times)[..., : self.problem.model.nx]
+        return _interpolate(times, self.t, self.x)
 
     def costate_at(self, t: ArrayLike) -> np.ndarray:
         """Return the costate at time(s) t [s], interpolated as the state is."""
+        times = _instants(t, "costate_at")
         if self.control_kind == "extremal":
-            return self._canonical(t)[..., self.problem.model.nx :]
-        return _interpolate(np.asarray(t, dtype=float), self.t, self.costate)
+            return self._canonical(times)[..., self.problem.model.nx :]
+        return _interpolate(times, self.t, self.costate)
 
     def control(self, t: ArrayLike) -> np.ndarray:
         """Return the control at time(s) t [s], (nu,) or (len(t), nu), as its kind says.
@@ -213,7 +215,7 @@ class Solution:
         That of an extremal is accurate to O(h^4), h the distance of the nodes, where the
         signals of the problem are smooth between them.
         """
-        times = np.asarray(t, dtype=float)
+        times = _instants(t, "control")
         if self.control_kind == "held":
             index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
             return self.u[np.clip(index, 0, len(self.u) - 1)]
@@ -234,7 +236,7 @@ class Solution:
     def pieces(self) -> PiecewisePolynomial:
         """The polynomials of a control of that kind."""
         count = len(self.breaks) - 1
-        coefficients = self.u.reshape(count, -1, self.problem.model.nu)
+        coefficients = self.u.reshape(count, len(self.u) // count, self.problem.model.nu)
         return PiecewisePolynomial(self.t[self.breaks], coefficients)
 
     def sample(self, part: str, fractions: np.ndarray, width: int) -> np.ndarray | None:
@@ -247,9 +249,9 @@ class Solution:
             )
         return values
 
-    def _canonical(self, t: ArrayLike) -> np.ndarray:
+    def _canonical(self, t: np.ndarray) -> np.ndarray:
         """State and costate of an extremal."""
-        return self._cubics(np.clip(np.asarray(t, dtype=float), self.t[0], self.t[-1]))
+        return self._cubics(np.clip(t, self.t[0], self.t[-1]))
 
     @cached_property
     def _cubics(self) -> PPoly:
@@ -335,5 +337,16 @@ _SCALARS = {
 }
 
 
-def _interpolate(t: ArrayLike, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(np.asarray(t, dtype=float), nodes, c) for c in rows.T], axis=-1)
+def _instants(t: ArrayLike, what: str) -> np.ndarray:
+    """Return times [s] as an array of at most one axis, checked."""
+    times = check_numeric(t, f"solution.{what}: t [s]")
+    if times.ndim > 1:
+        raise ProblemError(f"solution.{what}: t has shape {times.shape}, one axis is needed")
+    if not np.isfinite(times).all():
+        raise ProblemError(f"solution.{what}: t is not finite")
+    return times
+
+
+def _interpolate(t: np.ndarray, nodes: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    columns = [np.interp(t, nodes, c) for c in rows.T]
+    return np.stack(columns, axis=-1) if columns else np.empty((*t.shape, 0))

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ocp import Solution, Status, UnsupportedProblem
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp.internal import check_flag, check_instance, check_positive, check_whole
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.certificate import (
     AGREEMENT,
@@ -75,6 +75,7 @@ class CertifyOptions:
         check_whole(self.intervals, "certify: intervals")
         check_whole(self.starts, "certify: starts")
         check_whole(self.seed, "certify: seed", least=0)
+        check_flag(self.enumerate, "certify: enumerate")
         check_positive(self.seconds, "certify: seconds", finite=False)
 
 

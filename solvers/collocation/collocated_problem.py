@@ -5,7 +5,6 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import block_diag
 
 from ocp import OCP
 from ocp.internal import ConstraintRow, ConstraintRows, RunData, most_violated, time_unit
@@ -148,7 +147,8 @@ class CollocatedProblem:
             [p.b[:, None] for p in points],
             [p.B for p in points],
         )
-        spread, a, b, basis = (ca.sparsify(ca.DM(np.asarray(block_diag(*rows)))) for rows in blocks)
+        # Never as dense arrays: they would have the square of the number of intervals as size.
+        spread, a, b, basis = (ca.sparsify(ca.diagcat(*map(ca.DM, rows))) for rows in blocks)
         return spread, a, b, basis
 
     @cached_property

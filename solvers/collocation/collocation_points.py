@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 from scipy.special import roots_jacobi, roots_legendre
 
 from ocp import ProblemError
-from ocp.internal import bernstein
+from ocp.internal import bernstein, check_choice, check_whole
 
 Family = Literal["radau", "gauss"]
 LOWEST, HIGHEST = 2, 5
@@ -58,9 +58,8 @@ class CollocationPoints:
         Raises:
             ProblemError: for another family, or a degree outside 2 to 5.
         """
-        if family not in ("radau", "gauss"):
-            raise ProblemError(f"collocation points {family!r} are neither radau nor gauss")
-        if degree not in range(LOWEST, HIGHEST + 1):
+        check_choice(family, ("radau", "gauss"), "collocation: points")
+        if check_whole(degree, "collocation: degree") not in range(LOWEST, HIGHEST + 1):
             raise ProblemError(f"a degree of {degree!r}: it is a number from {LOWEST} to {HIGHEST}")
         return _points(family, int(degree))
 

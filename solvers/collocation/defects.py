@@ -109,4 +109,5 @@ class Defects:
     def _polynomials(self, u: np.ndarray) -> PiecewisePolynomial:
         """The controls of coefficients (K m, nu) over fractions of the horizon."""
         mesh, nu = self.grid.mesh, self.ocp.model.nu
-        return PiecewisePolynomial(np.asarray(mesh.edges), u.reshape(mesh.intervals, -1, nu))
+        shape = (mesh.intervals, len(u) // mesh.intervals, nu)  # nu may be 0: no -1 here
+        return PiecewisePolynomial(np.asarray(mesh.edges), u.reshape(shape))

@@ -90,7 +90,7 @@ class AugmentedLagrangian(ScalingSolver):
         if not self.growth > 1.0:
             raise ProblemError(f"augmented Lagrangian: growth = {self.growth}, it must exceed 1")
         for name in ("tolerance", "complementarity"):
-            check_positive(getattr(self, name), f"augmented Lagrangian: {name}", finite=False)
+            check_positive(getattr(self, name), f"augmented Lagrangian: {name}")
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "AugmentedLagrangian":
         """Set what is left open; see ``Solver``."""

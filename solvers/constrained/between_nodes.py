@@ -64,7 +64,7 @@ class BetweenNodes(ScalingSolver):
         """Check the options."""
         check_instance(self.inner, MultipleShooting, "between nodes: inner")
         check_whole(self.max_rounds, "between nodes: max_rounds")
-        check_positive(self.tolerance, "between nodes: tolerance", finite=False)
+        check_positive(self.tolerance, "between nodes: tolerance")
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "BetweenNodes":
         """Set what is left open; see ``Solver``."""

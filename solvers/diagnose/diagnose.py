@@ -1,6 +1,7 @@
 """``diagnose``: all checks on one problem, those that need no solve first."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from solvers.diagnose.checks.guess import guess
 from solvers.diagnose.checks.infeasible import infeasible
 from solvers.diagnose.checks.influence import influence
 from solvers.diagnose.checks.instants import instants
-from solvers.diagnose.checks.kink import kink
+from solvers.diagnose.checks.kink import declared_kinks, kink
 from solvers.diagnose.checks.not_finite import not_finite
 from solvers.diagnose.checks.scaling import scaling
 from solvers.diagnose.checks.time_kind import time_kind
@@ -49,6 +50,16 @@ _BEFORE: tuple[CheckFunction, ...] = (
 # What a trial solve shows.
 _AFTER: tuple[CheckFunction, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
 
+# What cannot be where there is a trajectory.
+_DISPROVED = (
+    Cause.NOT_FINITE,
+    Cause.START_VIOLATES,
+    Cause.CONTRADICTION,
+    Cause.UNREACHABLE,
+    Cause.OUT_OF_REACH,
+    Cause.CONFLICT,
+)
+
 # Enough for a trial; a solve that needs more is reported as such.
 _ITERATIONS = 200
 
@@ -77,9 +88,11 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
     subject = _subject(asked, MultipleShooting(intervals, max_iterations=_ITERATIONS))
     with np.errstate(all="ignore"):  # checks report what is not finite; no warnings
         findings = [finding for check in _BEFORE for finding in check(subject)]
-        if not any(f.severity is Severity.ERROR for f in findings):
+        findings = _tested(subject, findings)
+        if not any(_explains(f) for f in findings):
             findings += [finding for check in _AFTER for finding in check(subject)]
             findings += _unsolved(subject, findings)
+        findings = _tested(subject, findings)
     return Diagnosis.of(subject.ocp.name, findings)
 
 
@@ -89,10 +102,35 @@ def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProble
     return DiagnosedProblem(asked, RunData(asked.start(), 0.0, asked.parameter_values()), solver)
 
 
+def _tested(subject: DiagnosedProblem, findings: list[Finding]) -> list[Finding]:
+    """Return the findings that an answer leaves: no error remains where there is one.
+
+    What says that there is no trajectory is disproved by one and left out; what says that an
+    answer means nothing becomes a warning.
+    """
+    if not any(f.severity is Severity.ERROR for f in findings) or not subject.is_solved:
+        return findings
+    return [
+        replace(f, severity=Severity.WARNING) if f.severity is Severity.ERROR else f
+        for f in findings
+        if f.severity is not Severity.ERROR or f.cause not in _DISPROVED
+    ]
+
+
+def _explains(finding: Finding) -> bool:
+    """Whether a trial would only show consequences: after an error, on a hopeless grid."""
+    hopeless = finding.cause is Cause.COARSE_GRID and finding.severity is Severity.WARNING
+    return finding.severity is Severity.ERROR or hopeless
+
+
 def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Finding]:
     """Return that the trial failed, where no finding explains it."""
     trial = subject.trial
     if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
+        return
+    kinks = list(declared_kinks(subject))
+    yield from kinks
+    if kinks:
         return
     yield Finding(
         Cause.UNSOLVED,

@@ -93,6 +93,12 @@ class DiagnosedProblem:
         values = self.data.values.as_dict()
         return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)
 
+    @property
+    def is_solved(self) -> bool:
+        """Whether there is an answer: the given one, or that of the trial."""
+        given = self.given is not None and self.given.status.is_success
+        return given or self.trial.status.is_success
+
     @cached_property
     def along(self) -> SamplePoints:
         """The nodes of the first iterate; the last control is held at the end."""

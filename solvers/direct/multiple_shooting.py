@@ -13,6 +13,7 @@ from ocp.internal import (
     RunResult,
     ScalingSolver,
     Transcription,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -73,6 +74,8 @@ class MultipleShooting(ScalingSolver):
         check_whole(self.intervals, "multiple shooting: intervals")
         check_instance(self.integrator, Integrator, "multiple shooting: integrator")
         check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)
+        check_flag(self.compiled, "multiple shooting: compiled")
+        check_flag(self.feasibility_restoration, "multiple shooting: feasibility_restoration")
         self.nlp_backend.check()
 
     @property

@@ -13,8 +13,8 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from ocp import ProblemError, UnsupportedProblem, Work
-from ocp.internal import Transcription, check_positive, check_whole
+from ocp import UnsupportedProblem, Work
+from ocp.internal import Transcription, check_choice, check_flag, check_positive, check_whole
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
     SubprocessFunction,
@@ -53,8 +53,8 @@ class NlpBackend:
         Raises:
             ProblemError: for an unknown backend or a number that is not positive.
         """
-        if self.name not in ("ipopt", "fatrop"):
-            raise ProblemError(f"backend {self.name!r} is neither ipopt nor fatrop")
+        check_choice(self.name, ("ipopt", "fatrop"), "backend")
+        check_flag(self.verbose, "a backend's verbose")
         check_whole(self.max_iterations, "a backend's max_iterations")
         check_positive(self.tolerance, "a backend's tolerance")
         check_positive(self.time_limit, "a backend's time_limit [s]", finite=False)

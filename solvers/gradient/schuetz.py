@@ -11,7 +11,6 @@ from ocp import (
     Euler,
     InitialGuess,
     Integrator,
-    ProblemError,
     Program,
     Status,
     UnsupportedProblem,
@@ -22,6 +21,8 @@ from ocp.internal import (
     RunData,
     RunResult,
     ScalingSolver,
+    check_choice,
+    check_flag,
     check_instance,
     check_not_negative,
     check_whole,
@@ -75,10 +76,10 @@ class Schuetz(ScalingSolver):
         check_instance(self.step, (FixedStep, Armijo), "Schuetz: step")
         for name in ("decrease", "stationarity"):
             check_not_negative(getattr(self, name), f"Schuetz: {name}", finite=False)
-        if self.direction not in get_args(DirectionRule):
-            raise ProblemError(f"direction = {self.direction!r} is not known")
-        if self.gradient not in ("continuous", "discrete"):
-            raise ProblemError(f"gradient = {self.gradient!r} is neither continuous nor discrete")
+        check_choice(self.direction, get_args(DirectionRule), "Schuetz: direction")
+        check_choice(self.gradient, ("continuous", "discrete"), "Schuetz: gradient")
+        check_flag(self.stop_on_rise, "Schuetz: stop_on_rise")
+        check_flag(self.compiled, "Schuetz: compiled")
 
     @classmethod
     def sound(cls, *, intervals: int = 75, max_iterations: int = 500) -> "Schuetz":

@@ -5,12 +5,14 @@ from typing import Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, ProblemError, Solution, UnsupportedProblem, Work
+from ocp import OCP, RK4, InitialGuess, Integrator, Solution, UnsupportedProblem, Work
 from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
     ScalingSolver,
+    check_choice,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -71,10 +73,9 @@ class IndirectShooting(ScalingSolver):
         if self.continuation is not None:
             kinds = (HorizonContinuation, ParameterContinuation)
             check_instance(self.continuation, kinds, "indirect shooting: continuation")
-        if self.jacobian not in ("exact", "finite-difference"):
-            raise ProblemError(
-                f"jacobian = {self.jacobian!r} is neither exact nor finite-difference"
-            )
+        check_choice(self.jacobian, ("exact", "finite-difference"), "indirect shooting: jacobian")
+        check_flag(self.damped, "indirect shooting: damped")
+        check_flag(self.compiled, "indirect shooting: compiled")
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "IndirectShooting":
         """Set what is left open; see ``Solver``."""

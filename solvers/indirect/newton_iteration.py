@@ -18,6 +18,7 @@ class NewtonResult:
         residual: max norm of the residual there.
         converged: whether it is below the tolerance.
         diverged: whether the residual stopped being finite.
+        singular: whether it stopped where the Jacobian is singular.
         steps: Newton steps taken.
         evaluations: residuals evaluated.
         history: residual norm after each step, the first included.
@@ -27,6 +28,7 @@ class NewtonResult:
     residual: float
     converged: bool
     diverged: bool
+    singular: bool
     steps: int
     evaluations: int
     history: np.ndarray
@@ -34,7 +36,8 @@ class NewtonResult:
     @property
     def in_words(self) -> str:
         """How far it came, for a message."""
-        return f"residual {self.residual:.3g} after {self.steps} Newton steps"
+        where = ", where the Jacobian is singular" if self.singular else ""
+        return f"residual {self.residual:.3g} after {self.steps} Newton steps{where}"
 
 
 T = TypeVar("T")
@@ -70,11 +73,12 @@ def newton(
         damped: whether to test steps at all.
     """
     iterate = _Iterate(x, *residual(x))
-    best, history, evaluations, stalled = iterate, [iterate.norm], 1, False
+    best, history, evaluations, stalled, singular = iterate, [iterate.norm], 1, False, False
     while not stalled and len(history) <= max_steps and tolerance < iterate.norm < np.inf:
         solve = linearise(iterate.x, iterate.extra)
         d = -solve(iterate.r)
         if not np.isfinite(d).all():
+            singular = True
             break
         for fraction in _fractions(damped):
             trial = _Iterate(iterate.x + fraction * d, *residual(iterate.x + fraction * d))
@@ -92,6 +96,7 @@ def newton(
         residual=best.norm,
         converged=best.norm <= tolerance,
         diverged=not iterate.norm < np.inf,
+        singular=singular,
         steps=len(history) - 1,
         evaluations=evaluations,
         history=np.array(history),

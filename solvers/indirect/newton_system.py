@@ -1,10 +1,16 @@
 """The sparse linear system of a Newton step: put together from blocks, and factorised."""
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
+
+from solvers.linear.regular_matrix import LAPACK, is_regular
+
+# Up to this size LAPACK's dense factors cost less than sparse ones.
+_DENSE = 200
 
 
 def block_matrix(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
@@ -28,10 +34,15 @@ def block_matrix(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
 
 
 def factorised(jacobian: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the solve with a sparse LU factorisation; NaN if there is none."""
+    """Return the solve with an LU factorisation; NaN if the Jacobian is singular."""
+    size, _ = cast("tuple[int, int]", jacobian.shape)
+    if size > _DENSE:
+        return splu(jacobian).solve if is_regular(jacobian) else _unsolvable
     if not np.isfinite(jacobian.data).all():
-        return lambda r: np.full_like(r, np.nan)
-    try:
-        return splu(jacobian).solve
-    except RuntimeError:  # SuperLU: the factor is exactly singular
-        return lambda r: np.full_like(r, np.nan)
+        return _unsolvable
+    factor, pivots, singular = LAPACK.dgetrf(jacobian.toarray())
+    return _unsolvable if singular else lambda r: LAPACK.dgetrs(factor, pivots, r)[0]
+
+
+def _unsolvable(r: np.ndarray) -> np.ndarray:
+    return np.full_like(r, np.nan)

@@ -130,7 +130,7 @@ def concave_at(
     p = np.vstack([schedule.p_left, schedule.p_last])
     box, nu = extremals.ocp.control_bounds, u.shape[1]
     curvature = extremals.optimality.hamiltonian.control_curvature.map(len(t))
-    hessians = np.array(curvature(x.T, u.T, costate.T, t[None, :], p.T)).T.reshape(-1, nu, nu)
+    hessians = np.array(curvature(x.T, u.T, costate.T, t[None, :], p.T)).T.reshape(len(t), nu, nu)
     free = (u > np.asarray(box.lower)) & (u < np.asarray(box.upper))
     lowest = np.full(len(t), np.inf)
     for pattern in np.unique(free, axis=0):  # all with the same controls free at once

@@ -1,11 +1,15 @@
-"""By how much half the integration step would change an extremal, without solving again."""
+"""By how much half the integration step would change an extremal, and half of it where needed."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ocp import Solution
+from ocp import Solution, Status, Work
 from solvers.indirect.indirect_shooting import IndirectShootingProgram
+
+_MOST_STEPS = 2**16
+# The cost is flat about an optimum: where it holds to some accuracy, states may move by more.
+_STATE = 100.0
 
 
 @dataclass(frozen=True)
@@ -57,3 +61,47 @@ def change_when_halved(
         cost=abs(float(fine.costs.sum() - coarse.costs.sum() + (costate * moved).sum())),
         state=float((np.abs(moved) / (1.0 + np.abs(x))).max()),
     )
+
+
+def halved_until_still(
+    result: Solution, program: IndirectShootingProgram, accuracy: float
+) -> tuple[Solution, IndirectShootingProgram]:
+    """Double the steps until cost and states hold still, or say by how much they do not.
+
+    Args:
+        result: an extremal that ``program`` found.
+        program: with the steps it has.
+        accuracy: of the cost, relative to 1 + cost; of states a hundred times that.
+
+    Returns:
+        the extremal, and the program that found it; ``INACCURATE`` beyond 65536 steps, or where
+        Newton's method fails on the way.
+    """
+    while result.status.is_success:
+        half = finer(program)
+        moved = change_when_halved(result, program, half)
+        result = result.with_(work=result.work + Work(rollouts=2))
+        relative = moved.cost / (1.0 + abs(result.cost))
+        if relative <= accuracy and moved.state <= _STATE * accuracy:
+            break
+        said = f"half of its {program.solver.steps} steps would change the cost by {moved.cost:.1e}"
+        said = f"{said}, a state by {moved.state:.1e}"
+        if half.solver.steps > _MOST_STEPS:
+            return result.with_(status=Status.INACCURATE, message=said), program
+        again = joined(result, run_from(half, result))
+        if not again.status.is_success:
+            said = f"{said}; with {half.solver.steps}: {again.status.name}, {again.message}"
+            return result.with_(status=Status.INACCURATE, message=said), program
+        result, program = again, half
+    return result, program
+
+
+def run_from(program: IndirectShootingProgram, guess: Solution) -> Solution:
+    """Solve for the data of a solution, from it."""
+    data = guess.data
+    return program.run(x0=data.x0, t0=data.t0, parameters=guess.parameters, guess=guess)
+
+
+def joined(first: Solution, then: Solution) -> Solution:
+    """Return the second solution with the effort of both."""
+    return then.with_(iterations=first.iterations + then.iterations, work=first.work + then.work)

@@ -15,6 +15,7 @@ from ocp.internal import (
     MethodSolver,
     RunData,
     RunResult,
+    check_flag,
 )
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.stacked_prediction import StackedPrediction
@@ -39,6 +40,10 @@ class Batch(MethodSolver):
     """
 
     prestabilise: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the option."""
+        check_flag(self.prestabilise, "Batch: prestabilise")
 
     def build(self, ocp: OCP) -> "BatchProgram":
         """Stack and factorise."""

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, ProblemError, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,
@@ -14,6 +14,7 @@ from ocp.internal import (
     RunData,
     RunResult,
     ScalingSolver,
+    check_choice,
     check_positive,
     start_violation,
 )
@@ -62,8 +63,7 @@ class LinearMPC(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
-        if self.form not in _FORMS:
-            raise ProblemError(f"LinearMPC: form = {self.form!r} is neither sparse nor condensed")
+        check_choice(self.form, _FORMS, "LinearMPC: form")
         check_positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")

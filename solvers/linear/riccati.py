@@ -9,13 +9,19 @@ import numpy as np
 from ocp import (
     OCP,
     InitialGuess,
-    ProblemError,
     Status,
     Work,
     linear_quadratic,
     with_stationary_end,
 )
-from ocp.internal import LinearQuadratic, MethodProgram, MethodSolver, RunData, RunResult
+from ocp.internal import (
+    LinearQuadratic,
+    MethodProgram,
+    MethodSolver,
+    RunData,
+    RunResult,
+    check_choice,
+)
 from solvers.linear import regulator_gains as recursion
 
 
@@ -39,10 +45,7 @@ class Riccati(MethodSolver):
 
     def __post_init__(self) -> None:
         """Check the option."""
-        if self.horizon not in ("finite", "infinite"):
-            raise ProblemError(
-                f"Riccati: horizon = {self.horizon!r} is neither finite nor infinite"
-            )
+        check_choice(self.horizon, ("finite", "infinite"), "Riccati: horizon")
 
     def build(self, ocp: OCP) -> "RiccatiProgram":
         """Read the matrices; where they are constant, do the recursion."""

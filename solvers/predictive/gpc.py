@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from ocp import Box, ProblemError, Status
-from ocp.internal import check_instance, check_not_negative, check_positive
+from ocp.internal import check_instance, check_not_negative, check_positive, check_whole
 from solvers.linear.qp.least_violation import least_violation
 from solvers.linear.qp.qp_backends import QpBackend, qp_backend
 from solvers.linear.qp.quadratic_program import QP
@@ -66,8 +66,8 @@ class GPC:
         """Check the options."""
         for name in ("n2", "n1", "nu"):
             value = getattr(self, name)
-            if not isinstance(value, int | np.integer) and not (value is None and name != "n2"):
-                raise ProblemError(f"GPC: {name} = {value!r}, a whole number of steps is needed")
+            if value is not None or name == "n2":
+                check_whole(value, f"GPC: {name} [steps]", least=0)
         check_positive(self.tolerance, "GPC: tolerance", below=1.0)
         check_not_negative(self.weight, "GPC: weight")
         for name in ("increment_bounds", "input_bounds", "output_bounds"):

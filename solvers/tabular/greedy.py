@@ -63,6 +63,7 @@ class Greedy(ScalingSolver):
     def __post_init__(self) -> None:
         """Check the options."""
         check_whole(self.intervals, "Greedy: intervals")
+        check_instance(self.integrator, Integrator, "Greedy: integrator")
         check_whole(self.max_iterations, "Greedy: max_iterations")
         check_positive(self.tolerance, "Greedy: tolerance", below=1.0)
 

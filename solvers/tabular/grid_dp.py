@@ -86,6 +86,7 @@ class GridDP(MethodSolver):
     def __post_init__(self) -> None:
         """Check the options."""
         check_whole(self.intervals, "GridDP: intervals")
+        check_instance(self.integrator, Integrator, "GridDP: integrator")
         for name in ("terminal_slack", "accuracy", "memory"):
             check_not_negative(getattr(self, name), f"GridDP: {name}", finite=False)
 
@@ -200,6 +201,11 @@ class GridDPProgram(MethodProgram):
     ) -> ValueFunction:
         """Return value function, policy and reachable sets for these data."""
         return self._tables(RunData.of(self.ocp, t0=t0, parameters=parameters))[-1]
+
+    @property
+    def _differentiates(self) -> bool:
+        """Bellman's recursion compares values."""
+        return False
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Fill the table, unless it is the last one, and follow its policy; no guess is used."""

@@ -1,5 +1,6 @@
 """Collocation takes everything that a description in continuous time can say."""
 
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,9 @@ from ocp import (
 )
 from ocp.problem.run_data import RunData
 from solvers import Collocation, IndirectShooting, Mesh, MultipleShooting, Schuetz, polish
+from solvers.collocation.collocated_problem import CollocatedProblem
 from solvers.collocation.collocation_points import Family
+from solvers.collocation.mesh import CollocationGrid
 from tests.mpc.problems import cart
 from tests.solvers.problems import (
     OTHER,
@@ -337,3 +340,15 @@ def test_the_program_has_no_more_entries_than_it_needs() -> None:
         program = Collocation(intervals, 3).prepare(van_der_pol()).transcription.program
         counts.append(ca.jacobian_sparsity(program["g"], program["x"]).nnz())
     assert counts[1] <= 2 * counts[0]
+
+
+def test_no_dense_matrix_of_all_intervals():
+    intervals, degree = 400, 3
+    problem = CollocatedProblem(van_der_pol(), CollocationGrid.of(Mesh.uniform(400, 3), "radau"))
+    tracemalloc.start()
+    matrices = problem._matrices
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    most = [intervals * degree, intervals * degree**2] * 2
+    assert all(m.nnz() <= limit for m, limit in zip(matrices, most, strict=True))
+    assert peak < 0.2 * 8 * (intervals * degree) ** 2

@@ -53,7 +53,7 @@ def test_the_first_of_two_alike_is_kept():
 def test_text():
     assert str(Diagnosis.of("p", [])) == "p: nothing found."
     text = str(Diagnosis.of("p", [finding(Cause.KINK)]))
-    assert text == "p:\n1. WARNING: a kink in what is declared smooth (x). Said."
+    assert text == "p:\n1. WARNING: a kink or a jump, which derivatives do not see (x). Said."
     late = Finding(Cause.KINK, Severity.ERROR, ("x", "y"), "Said.", 1.0, "m", 2.5)
     assert "(x, y at t = 2.5 s)" in str(late)
 

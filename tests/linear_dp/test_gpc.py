@@ -13,7 +13,15 @@ from tests.tolerances import ROUNDING
 THESIS = Carima([1.0, -0.8], [0.4, 0.6])
 LATE = Carima([1.0, -0.8], [0.4, 0.6], delay=2)
 COLOURED = Carima([1.0, -1.5, 0.7], [0.4, 0.6, 0.1], [1.0, 0.5, 0.2], delay=1)
-PLANTS = {"thesis": THESIS, "late": LATE, "coloured": COLOURED}
+# One coefficient of everything, and a plant without memory: blocks of the state are empty.
+SIMPLE, MEMORYLESS = Carima([1.0, -0.9], [0.1]), Carima([1.0], [2.0])
+PLANTS = {
+    "thesis": THESIS,
+    "late": LATE,
+    "coloured": COLOURED,
+    "simple": SIMPLE,
+    "memoryless": MEMORYLESS,
+}
 # The law and a solver compute the same numbers by different ways; the issue asks for this.
 SAME = 1e-9
 

@@ -111,3 +111,15 @@ def test_roots_that_newton_does_not_confirm_are_counted() -> None:
     found = enumerate_extremals(bare(), solver=hasty)
     assert (len(found.solutions), found.lost) == (0, 1)
     assert found.costs.shape == (0,)
+
+
+def test_steps_are_halved_until_the_cost_holds_still():
+    # From few steps the same extremals as from many.
+    ocp = bare()
+    coarse, fine = (
+        enumerate_extremals(ocp, solver=IndirectShooting(segments=15, steps=steps))
+        for steps in (30, 300)
+    )
+    np.testing.assert_allclose(coarse.costs[0], fine.costs[0], rtol=1e-7)
+    again = polish(coarse.solutions[0])
+    assert again.status is coarse.solutions[0].status

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ocp import Guess
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem
@@ -25,7 +26,13 @@ def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, u = subject.ocp, subject.trial.u
     nothing = ocp.control_bounds.clip(np.zeros_like(u))
     at_end = bool(ocp.at("terminal"))
-    if at_end or ocp.has_free_time or np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max()):
+    if at_end or not u.size or ocp.has_free_time:
+        return
+    if np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max()):
+        return
+    better = _from_elsewhere(subject)
+    if better < subject.trial.cost - _SAME * (1.0 + abs(subject.trial.cost)):
+        yield _stationary_start(subject, better)
         return
     yield Finding(
         Cause.NO_GOAL,
@@ -34,6 +41,30 @@ def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
         "The optimum is to do nothing: every control stays at the number nearest to zero. Is a "
         "terminal constraint missing, does a reward lack its minus, or is the start the goal?",
         0.0,
+    )
+
+
+def _from_elsewhere(subject: DiagnosedProblem) -> float:
+    """Return the lowest cost that is found from constant controls; inf where none is found."""
+    ocp, data, costs = subject.ocp, subject.data, [np.inf]
+    for side in (0.5, -0.5):
+        start = Guess(u=ocp.control_bounds.clip(np.full(ocp.model.nu, side)))
+        found = subject.program.run(
+            x0=data.x0, t0=data.t0, parameters=data.values.as_dict(), guess=start
+        )
+        costs.append(found.cost if found.status.is_success else np.inf)
+    return min(costs)
+
+
+def _stationary_start(subject: DiagnosedProblem, better: float) -> Finding:
+    return Finding(
+        Cause.STATIONARY_GUESS,
+        Severity.WARNING,
+        subject.ocp.model.u_names,
+        f"The solver ends where every control is the number nearest to zero, at the cost "
+        f"{subject.trial.cost:.4g}; from other controls it finds {better:.4g}. Its start is "
+        "stationary, but no minimum: give guess=Guess(u=...) that is not zero, or use multistart.",
+        better,
     )
 
 

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from solvers.diagnose.cause import Cause
+from solvers.diagnose.checks.influence import feeding
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.graph import depends
 from solvers.diagnose.subject import DiagnosedProblem
@@ -34,10 +35,32 @@ def _linear(subject: DiagnosedProblem) -> Iterator[Finding]:
         if depends(slope, m.u) or depends(ca.jacobian(m.f, u), m.u):
             continue
         if not slope.nnz():
-            yield _free(subject, name)
+            if not _determined(subject, i):
+                yield _free(subject, name)
         else:
             values = subject.along.evaluate(ocp, slope)
             yield _linear_in(subject, name, float(values[np.isfinite(values)].mean()))
+
+
+def _determined(subject: DiagnosedProblem, i: int) -> bool:
+    """Whether an equation on the way fixes a state that the control moves, and so the control.
+
+    Such as the force in a rod, which keeps its length.
+    """
+    ocp, m = subject.ocp, subject.ocp.model
+    equations = [
+        row
+        for c in ocp.at("path")
+        for row, low, high in zip(
+            ca.vertsplit(c.expression), np.asarray(c.lower), np.asarray(c.upper), strict=True
+        )
+        if low == high
+    ]
+    if not equations:
+        return False
+    fixed = np.array([depends(ca.vertcat(*equations), m.x[k]) for k in range(m.nx)])
+    moved = np.array([depends(m.f[k], m.u[i]) for k in range(m.nx)])
+    return bool((feeding(ocp, fixed) & moved).any())
 
 
 def _free(subject: DiagnosedProblem, name: str) -> Finding:
@@ -74,6 +97,8 @@ def _linear_in(subject: DiagnosedProblem, name: str, slope: float) -> Finding:
 
 def _concave_control(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, m = subject.ocp, subject.ocp.model
+    if not m.nu:
+        return
     hessian = ca.hessian(ca.SX(ocp.running_cost), m.u)[0]
     points = subject.along + subject.around
     values = points.evaluate(ocp, hessian).reshape(-1, m.nu, m.nu)

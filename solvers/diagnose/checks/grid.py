@@ -14,7 +14,7 @@ from solvers.diagnose.subject import DiagnosedProblem
 
 # RK4 is stable for eigenvalues up to here, times the step [Hairer & Wanner 1996, IV.2].
 _STABLE = 2.78
-# Far beyond it: no solve is needed to know, and none would mean anything.
+# Far beyond it no explicit method gives an answer that means anything.
 _HOPELESS = 20.0
 # The referee's states may differ from the solver's by this, relative to 1 + abs(x).
 _DEFECT = 1e-2
@@ -43,12 +43,12 @@ def grid(subject: DiagnosedProblem) -> Iterator[Finding]:
     needed = int(np.ceil(fastest * ocp.duration / _STABLE))
     yield Finding(
         Cause.COARSE_GRID,
-        Severity.ERROR if hopeless else Severity.ADVICE,
+        Severity.WARNING if hopeless else Severity.ADVICE,
         names,
         f"The fastest motion, in {', '.join(names)}, has a time constant of {1 / fastest:.2g} s, "
         f"the step is {h:.2g} s ({fastest * h:.3g} time constants; RK4 is stable up to {_STABLE}). "
-        f"Take at least {needed} steps (intervals times the integrator's steps), or replace what "
-        "is so fast by its stationary value.",
+        f"Take {needed} steps or more (intervals times the integrator's steps), Collocation, which "
+        "is implicit, or replace what is so fast by its stationary value.",
         fastest * h,
         instant=float(subject.along.t[np.flatnonzero(finite)[k]]),
     )

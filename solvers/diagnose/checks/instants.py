@@ -60,8 +60,13 @@ def _least(subject: DiagnosedProblem, elastic: ElasticProgram) -> ElasticSolutio
     along, around = subject.along, subject.around
     x = np.vstack([along.x[[0, -1]], around.x])[:_STARTS]
     u = np.vstack([along.u[[0, -1]], around.u])[:_STARTS]
+    return _least_from(elastic, np.nan_to_num(np.hstack([x, u])))
+
+
+def _least_from(elastic: ElasticProgram, starts: np.ndarray) -> ElasticSolution | None:
+    """Return the least violating answer from some starts; None if all can be met, or unknown."""
     best = None
-    for w0 in np.nan_to_num(np.hstack([x, u])):
+    for w0 in starts:
         answer = elastic.solve(w0, np.empty(0), range(len(elastic.demands)))
         if elastic.is_possible(answer):
             return None
@@ -119,10 +124,10 @@ def _start(subject: DiagnosedProblem) -> Iterator[Finding]:
     x0, t0 = subject.data.x0, subject.data.t0
     fixed = [(d, ca.substitute(row, m.x, ca.DM(x0)), low, high) for d, row, low, high in asked]
     elastic = at_instant(subject, fixed, t0, 0.0)
-    answer = elastic.solve(
-        np.append(x0, subject.along.u[0]), np.empty(0), range(len(elastic.demands))
-    )
-    if elastic.is_possible(answer) or not answer.found:
+    # From several controls: at one of them the gradient of a constraint may vanish.
+    controls = np.vstack([subject.along.u[:1], subject.around.u])[:_STARTS]
+    answer = _least_from(elastic, np.hstack([np.tile(x0, (len(controls), 1)), controls]))
+    if answer is None:
         return
     worst = int(elastic.excess(answer).argmax())
     demand, amount = elastic.demands[worst], float(answer.slack[worst])

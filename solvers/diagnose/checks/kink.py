@@ -13,13 +13,26 @@ from solvers.diagnose.subject import DiagnosedProblem, SamplePoints
 # Operations that switch where one argument, or the difference of two, is zero.
 _ONE = (ca.OP_FABS, ca.OP_SIGN)
 _TWO = (ca.OP_FMAX, ca.OP_FMIN, ca.OP_LT, ca.OP_LE)
+# Those that slack controls replace.
+_SLACK = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
 _ASIDE = 1e-7
 _JUMP = 1e-4
 _HALVINGS = 50
 
 
 def kink(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """Compare value, slope and curvature on both sides of every switch."""
+    """Compare value, slope and curvature on both sides of every switch; name what is undeclared."""
+    declared = subject.ocp.smoothness
+    yield from (f for f in _switches(subject) if f.evidence < max(declared, 0))
+
+
+def declared_kinks(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Return the kinks that the problem declares: what explains a solver that fails."""
+    declared = subject.ocp.smoothness
+    yield from (f for f in _switches(subject) if declared <= f.evidence < 1)
+
+
+def _switches(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, m = subject.ocp, subject.ocp.model
     terms = (
         ("the running cost", ca.SX(ocp.running_cost)),
@@ -32,7 +45,7 @@ def kink(subject: DiagnosedProblem) -> Iterator[Finding]:
             if switch is None or not depends(switch, ca.vertcat(m.x, m.u)):
                 continue
             order = _smoothness(subject, expression, switch)
-            if order is not None and order < ocp.smoothness:
+            if order is not None and order < 2:
                 yield _finding(subject, what, node, switch, order)
 
 
@@ -93,13 +106,39 @@ def _finding(
     subject: DiagnosedProblem, what: str, node: ca.SX, switch: ca.SX, order: int
 ) -> Finding:
     sort = {-1: "jumps", 0: "has a kink", 1: "has a jump in its second derivative"}[order]
+    declared = subject.ocp.smoothness
+    known = order >= 0 and declared <= order
+    said = f"{what[0].upper()}{what[1:]} {sort} where {shown(switch)} = 0, in {shown(node)}"
+    said += "" if known else f", but smoothness={declared} is declared"
     return Finding(
         Cause.KINK,
         Severity.WARNING,
         appearing(subject.ocp, switch),
-        f"{what[0].upper()}{what[1:]} {sort} where {shown(switch)} = 0, in {shown(node)}, but "
-        f"smoothness={subject.ocp.smoothness} is declared: Newton's method may cycle there. "
-        f"Declare smoothness={max(order, 0)}, or smooth it (sqrt(a**2 + eps**2) for abs(a), a "
-        "slack variable for a maximum).",
+        f"{said}: {_consequence(order)}. {_remedy(what, node, order)}",
         float(order),
     )
+
+
+def _consequence(order: int) -> str:
+    if order < 0:
+        return "derivatives do not see a jump, and no grid makes the answer an optimum"
+    return "Newton's method may cycle there"
+
+
+def _remedy(what: str, node: ca.SX, order: int) -> str:
+    """Return what to write instead; declaring a kink does not make a method converge on it."""
+    smooth = "sqrt(a**2 + eps**2) for abs(a), (a + b + sqrt((a - b)**2 + eps**2)) / 2 for max(a, b)"
+    if order < 0:
+        return (
+            "Describe each branch as a phase of its own whose duration is free, or write "
+            "(1 + tanh(d / width)) / 2 for d > 0 and reduce the width."
+        )
+    if order == 1:
+        return "Declare smoothness=1, or take a term with continuous second derivatives."
+    if what == "the running cost" and node.op() in _SLACK:
+        return (
+            "Solve ocp.without_kinks(problem), which has a slack control and inequalities in its "
+            "place and the same optimum. By hand, for abs(u) of a control u: controls p and m "
+            "with control_bounds Box(0, ...), p - m in place of u, p + m in place of abs(u)."
+        )
+    return f"Write {smooth}, and reduce eps; smoothness=0 says that there is a kink."

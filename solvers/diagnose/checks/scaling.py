@@ -49,9 +49,8 @@ def _sizes_and_weights(subject: DiagnosedProblem) -> Iterator[Finding]:
             Severity.WARNING,
             (names[large], names[small]),
             f"{_sized(subject, names[large], sizes[large])} beside "
-            f"{_sized(subject, names[small], sizes[small])}: choose units in which both are near "
-            f"1, that is divide {names[large]} by {_power(sizes[large]):.0e} and {names[small]} "
-            f"by {_power(sizes[small]):.0e}.",
+            f"{_sized(subject, names[small], sizes[small])}: choose units in which all are near "
+            f"1, that is divide {_divisors(names, sizes)}.",
             float(sizes[large] / sizes[small]),
         )
     yield from _weights(subject, names, sizes)
@@ -59,6 +58,13 @@ def _sizes_and_weights(subject: DiagnosedProblem) -> Iterator[Finding]:
 
 def _sized(subject: DiagnosedProblem, name: str, size: float) -> str:
     return f"{name} is of size {size:.2g} {subject.unit(name)}".rstrip()
+
+
+def _divisors(names: tuple[str, ...], sizes: np.ndarray) -> str:
+    """Return what to divide by what; what is of size 1 stays as it is."""
+    powers = [(name, _power(size)) for name, size in zip(names, sizes, strict=True)]
+    said = [f"{name} by {power:.0e}" for name, power in powers if power != 1.0]
+    return " and ".join([", ".join(said[:-1]), said[-1]]) if len(said) > 1 else said[0]
 
 
 def _power(size: float) -> float:

@@ -10,6 +10,7 @@ from ocp.internal import (
     RunData,
     RunResult,
     ScalingSolver,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -69,8 +70,9 @@ class StagewiseNewton(ScalingSolver):
         check_whole(self.intervals, "stagewise Newton: intervals")
         check_whole(self.max_iterations, "stagewise Newton: max_iterations")
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")
-        for name in ("tolerance", "accuracy"):
-            check_positive(getattr(self, name), f"stagewise Newton: {name}", finite=False)
+        check_positive(self.tolerance, "stagewise Newton: tolerance")
+        check_positive(self.accuracy, "stagewise Newton: accuracy", finite=False)
+        check_flag(self.compiled, "stagewise Newton: compiled")
 
     @property
     def success_accuracy(self) -> float:
@@ -92,6 +94,8 @@ class StagewiseNewton(ScalingSolver):
 
 
 def _refuse(ocp: OCP) -> None:
+    if not ocp.model.nu:
+        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton needs a control, there is none")
     for c in ocp.constraints:
         raise UnsupportedProblem(
             f"{ocp.name}: stagewise Newton takes no {c.at} constraint ('{c.name}')"

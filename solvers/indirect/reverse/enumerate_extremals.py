@@ -20,10 +20,13 @@ from solvers.indirect.reverse.scan import Scan, Scanner
 from solvers.indirect.reverse.self_motion import seeds_around, self_motions
 from solvers.indirect.reverse.start_conditions import refuse_what_reverse_cannot
 from solvers.indirect.shooting_segments import ShootingSchedule
+from solvers.indirect.step_halving import halved_until_still
 
 # Of the scan: enough to find a root that Newton, with its own steps, then makes exact.
 _STEPS = 90
 _SEGMENTS, _FINE_STEPS, _NEWTON_STEPS = 15, 300, 12
+# By how much half of Newton's steps may change the cost, as in ``polish``.
+_ACCURACY = 1e-8
 # Two extremals with all states this close are one.
 _SAME = 1e-6
 # A start this far from the manifold is not on it.
@@ -202,8 +205,9 @@ def _exact(
         solution = program.run(
             x0=data.x0, t0=data.t0, parameters=data.values.as_dict(), guess=guess
         )
+        solution, fine = halved_until_still(solution, program, _ACCURACY)
         if solution.status.is_success:
-            verdict = program.second_order(solution)
+            verdict = fine.second_order(solution)
             status = Status.SOLVED if verdict.passed else Status.STATIONARY
             solution = solution.with_(status=status, message=verdict.reason)
         yield solution

@@ -22,6 +22,7 @@ from ocp.internal import (
     MethodSolver,
     RunData,
     RunResult,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
@@ -83,12 +84,13 @@ class ReverseShooting(MethodSolver):
         check_whole(self.steps, "reverse shooting: steps")
         check_whole(self.max_steps, "reverse shooting: max_steps")
         check_instance(self.integrator, Integrator, "reverse shooting: integrator")
-        if self.boundary not in (2, 3, 4):
+        if check_whole(self.boundary, "reverse shooting: boundary", least=0) not in (2, 3, 4):
             raise ProblemError(
                 f"reverse shooting: boundary = {self.boundary!r}, it is 2, 3 or 4 (type 1 is "
                 "IndirectShooting)"
             )
-        check_positive(self.tolerance, "reverse shooting: tolerance", finite=False)
+        check_positive(self.tolerance, "reverse shooting: tolerance")
+        check_flag(self.damped, "reverse shooting: damped")
 
     def build(self, ocp: OCP) -> "ReverseShootingProgram":
         """Derive the canonical flow and the conditions at both ends."""

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solvers.linear.qp.multiplier_space import LAPACK, MultiplierSpace
+from solvers.linear.qp.multiplier_space import MultiplierSpace
 from solvers.linear.qp.quadratic_program import QP, Residuals, residuals
+from solvers.linear.regular_matrix import LAPACK
 
 # How often all wrong rows are exchanged at once before they are exchanged one by one.
 _BLOCK_STEPS = 8
@@ -73,7 +74,7 @@ class ActiveSet:
         if not (same and space is not None and np.array_equal(space.equal, qp.l == qp.u)):
             try:
                 self._space = MultiplierSpace(qp)
-            except RuntimeError:  # exactly singular
+            except np.linalg.LinAlgError:
                 self._space = None
             self._of = qp
         return self._space

@@ -1,16 +1,14 @@
 """A quadratic program seen from its multipliers: small, and factorised once for all runs."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from solvers.linear.qp.quadratic_program import QP
+from solvers.linear.regular_matrix import LAPACK, is_regular
 
-# Its functions are compiled and have no types.
-LAPACK: Any = lapack
 # Subtracted from the diagonal so that dependent equations do not stop the factorisation; taken
 # out again by refinement.
 _REGULARISATION = 1e-12
@@ -48,7 +46,7 @@ class MultiplierSpace:
         """Factorise K.
 
         Raises:
-            RuntimeError: if it is singular.
+            LinAlgError: if it is singular.
         """
         self.equal = qp.l == qp.u
         self._equations = np.flatnonzero(self.equal)
@@ -56,7 +54,10 @@ class MultiplierSpace:
         self._rows = qp.G.tocsr()
         e = self._rows[self._equations]
         small = -_REGULARISATION * sp.identity(count)
-        self._solve = splu(sp.csc_matrix(sp.bmat([[qp.H, e.T], [e, small]], format="csc"))).solve
+        system = sp.csc_matrix(sp.bmat([[qp.H, e.T], [e, small]], format="csc"))
+        if not is_regular(system):
+            raise np.linalg.LinAlgError("the matrix of cost and equations is singular")
+        self._solve = splu(system).solve
         self._slot = np.full(len(qp.l), -1)
         self._v, self._m = np.empty((self._n + count, 0)), np.empty((0, 0))
 

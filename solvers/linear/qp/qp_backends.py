@@ -210,7 +210,7 @@ def qp_backend(name: str, tolerance: float) -> QpBackend:
         ProblemError: if the name is unknown, or, with the command to type, if it is not installed.
     """
     known = known_backends()
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise ProblemError(f"QP backend {name!r} is not one of {', '.join(known)}")
     if name == "osqp":
         return OSQPBackend(tolerance)
