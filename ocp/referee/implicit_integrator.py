@@ -90,8 +90,8 @@ def integrate_implicitly(
             )
         except RuntimeError:  # what CasADi raises for every failure of CVODES
             break
-        ends[i] = size * np.array(after).T
-        costs[i] = cost_size * np.diff(np.array(cost).ravel(), prepend=0.0)
+        ends[i] = size * np.array(found["xf"]).T
+        costs[i] = cost_size * np.diff(np.array(found["qf"]).ravel(), prepend=0.0)
         x[i] = np.vstack([w, ends[i][:-1]])
         w = ends[i.stop - 1]
     x[-1] = ends[-1]
@@ -202,7 +202,7 @@ class _Extremal:
 
 
 def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
-    """(states, data) -> states and running cost at samples of one interval, all by their sizes."""
+    """(x0, p) -> xf, qf: states and running cost at samples of one interval, by their sizes."""
     rate = _extremal_rate(ocp) if count == 0 else _known_rate(ocp, count)
     kind = symbol_type(rate)
     width, n_data = rate.size1_in(0), rate.size1_in(2)
@@ -221,10 +221,7 @@ def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
         "show_eval_warnings": False,
     }
     grid = (np.arange(1, samples + 1) / samples).tolist()
-    integrator = ca.integrator("piece", "cvodes", dae, 0.0, grid, options)
-    begin, given = ca.MX.sym("begin", width), ca.MX.sym("given", p.numel())
-    result = integrator(x0=begin, p=given)
-    return ca.Function("piece", [begin, given], [result["xf"], result["qf"]])
+    return ca.integrator("piece", "cvodes", dae, 0.0, grid, options)
 
 
 def _known_rate(ocp: OCP, count: int) -> ca.Function:
