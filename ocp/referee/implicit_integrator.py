@@ -76,18 +76,11 @@ def integrate_implicitly(
         if restarts is not None and restarts.flags[i.start, 0] > 0.5:
             w = np.concatenate([restarts.x[i.start], w[nx:]])
         w = control.restarted(w, t[k])
-        p = [
-            size,
-            cost_size,
-            t[k],
-            t[k + 1] - t[k],
-            steps.p_start[i.start],
-            steps.p_end[i.stop - 1],
-        ]
+        parameters = steps.p_start[i.start], steps.p_end[i.stop - 1]
+        data = np.hstack([size, cost_size, t[k], t[k + 1] - t[k], *parameters, drive[k]])
         try:
-            after, cost = piece(
-                w / size, np.concatenate([np.atleast_1d(v) for v in [*p, drive[k]]])
-            )
+            # Called by itself: inside another Function CasADi prints the inputs of a failure.
+            found = piece(x0=w / size, p=data)
         except RuntimeError:  # what CasADi raises for every failure of CVODES
             break
         ends[i] = size * np.array(found["xf"]).T
