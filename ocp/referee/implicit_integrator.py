@@ -76,22 +76,15 @@ def integrate_implicitly(
         if restarts is not None and restarts.flags[i.start, 0] > 0.5:
             w = np.concatenate([restarts.x[i.start], w[nx:]])
         w = control.restarted(w, t[k])
-        p = [
-            size,
-            cost_size,
-            t[k],
-            t[k + 1] - t[k],
-            steps.p_start[i.start],
-            steps.p_end[i.stop - 1],
-        ]
+        parameters = steps.p_start[i.start], steps.p_end[i.stop - 1]
+        data = np.hstack([size, cost_size, t[k], t[k + 1] - t[k], *parameters, drive[k]])
         try:
-            after, cost = piece(
-                w / size, np.concatenate([np.atleast_1d(v) for v in [*p, drive[k]]])
-            )
+            # Called by itself: inside another Function CasADi prints the inputs of a failure.
+            found = piece(x0=w / size, p=data)
         except RuntimeError:  # what CasADi raises for every failure of CVODES
             break
-        ends[i] = size * np.array(after).T
-        costs[i] = cost_size * np.diff(np.array(cost).ravel(), prepend=0.0)
+        ends[i] = size * np.array(found["xf"]).T
+        costs[i] = cost_size * np.diff(np.array(found["qf"]).ravel(), prepend=0.0)
         x[i] = np.vstack([w, ends[i][:-1]])
         w = ends[i.stop - 1]
     x[-1] = ends[-1]
@@ -202,7 +195,7 @@ class _Extremal:
 
 
 def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
-    """(states, data) -> states and running cost at samples of one interval, all by their sizes."""
+    """(x0, p) -> xf, qf: states and running cost at samples of one interval, by their sizes."""
     rate = _extremal_rate(ocp) if count == 0 else _known_rate(ocp, count)
     kind = symbol_type(rate)
     width, n_data = rate.size1_in(0), rate.size1_in(2)
@@ -221,10 +214,7 @@ def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
         "show_eval_warnings": False,
     }
     grid = (np.arange(1, samples + 1) / samples).tolist()
-    integrator = ca.integrator("piece", "cvodes", dae, 0.0, grid, options)
-    begin, given = ca.MX.sym("begin", width), ca.MX.sym("given", p.numel())
-    result = integrator(x0=begin, p=given)
-    return ca.Function("piece", [begin, given], [result["xf"], result["qf"]])
+    return ca.integrator("piece", "cvodes", dae, 0.0, grid, options)
 
 
 def _known_rate(ocp: OCP, count: int) -> ca.Function:
