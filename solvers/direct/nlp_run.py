@@ -222,6 +222,7 @@ class NlpRun:
         return (
             self.feasibility_restoration
             and outcome.status in _MAYBE_FIRST_ITERATE
+            and not outcome.is_undefined
             and not start_violation(self.transcription.ocp, data)
         )
 

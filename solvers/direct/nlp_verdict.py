@@ -72,6 +72,8 @@ class NlpVerdict:
             said = meaning(backend.name, result.return_status).sentence
             message = f"{backend.name} met a number that is not finite: {said}"
             return JudgedResult(result, Status.DIVERGED, message)
+        if result.is_undefined:  # cost and constraints may be those of no iterate at all
+            return JudgedResult(result, *self._judge_failure(result, ""))
         violation, row = self.transcription.worst(result.w, result.g, inputs.bounds)
         if violation > _VIOLATED:
             where = self.where(result, inputs.data, violation, row)
@@ -88,6 +90,8 @@ class NlpVerdict:
     def _judge_unfinished(self, inputs: NlpInputs, result: NlpResult) -> JudgedResult:
         """Accept a result that meets the constraints but not the backend's tolerance, or not."""
         is_control = self.transcription.is_control
+        if not self._residual.is_value(result, inputs.p):
+            return JudgedResult(result, *self._judge_failure(result, ""))
         fitted = with_fitted_multipliers(
             self.nlp.function, result, inputs.p, inputs.bounds, is_control
         )
