@@ -67,12 +67,14 @@ def check_whole(value: object, what: str, *, least: int = 1) -> int:
     Raises:
         ProblemError: otherwise, and for a bool or a float, naming ``what``.
     """
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_whole or not least <= value <= _MOST:
+    number = least - 1
+    if isinstance(value, int | np.integer) and not isinstance(value, bool):
+        number = int(value)
+    if not least <= number <= _MOST:
         raise ProblemError(
             f"{what} must be a whole number of at least {least}, not {_shown(value)}"
         )
-    return int(value)
+    return number
 
 
 def check_choice(value: object, choices: Iterable[str], what: str) -> None:

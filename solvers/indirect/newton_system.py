@@ -1,6 +1,7 @@
 """The sparse linear system of a Newton step: put together from blocks, and factorised."""
 
 from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 from scipy import sparse
@@ -34,7 +35,8 @@ def block_matrix(rows: list[list[np.ndarray | None]]) -> sparse.csc_matrix:
 
 def factorised(jacobian: sparse.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
     """Return the solve with an LU factorisation; NaN if the Jacobian is singular."""
-    if jacobian.shape[0] > _DENSE:
+    size, _ = cast("tuple[int, int]", jacobian.shape)
+    if size > _DENSE:
         return splu(jacobian).solve if is_regular(jacobian) else _unsolvable
     if not np.isfinite(jacobian.data).all():
         return _unsolvable

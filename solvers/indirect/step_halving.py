@@ -7,7 +7,7 @@ import numpy as np
 from ocp import Solution, Status, Work
 from solvers.indirect.indirect_shooting import IndirectShootingProgram
 
-MOST_STEPS = 2**16
+_MOST_STEPS = 2**16
 # The cost is flat about an optimum: where it holds to some accuracy, states may move by more.
 _STATE = 100.0
 
@@ -86,7 +86,7 @@ def halved_until_still(
             break
         said = f"half of its {program.solver.steps} steps would change the cost by {moved.cost:.1e}"
         said = f"{said}, a state by {moved.state:.1e}"
-        if half.solver.steps > MOST_STEPS:
+        if half.solver.steps > _MOST_STEPS:
             return result.with_(status=Status.INACCURATE, message=said), program
         again = joined(result, run_from(half, result))
         if not again.status.is_success:

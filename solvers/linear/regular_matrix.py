@@ -1,6 +1,6 @@
 """Whether a sparse matrix is regular, found by LAPACK, which a singular one does not crash."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy import sparse
@@ -15,7 +15,7 @@ _SINGULAR = 1e-17
 _ROUNDS = 3
 
 
-def is_regular(matrix: sparse.spmatrix) -> bool:
+def is_regular(matrix: sparse.csc_matrix) -> bool:
     """Whether a square matrix (n, n) is finite and not singular to rounding.
 
     SuperLU (``scipy.sparse.linalg.splu``) reads memory that is not its own where a column has no
@@ -25,8 +25,8 @@ def is_regular(matrix: sparse.spmatrix) -> bool:
     """
     if not np.isfinite(matrix.data).all():
         return False
-    banded = _narrow(_balanced(matrix.tocoo()))
-    n = banded.shape[0]
+    banded = _narrow(_balanced(sparse.coo_matrix(matrix)))
+    n, _ = _shape(banded)
     offsets = banded.row - banded.col
     below, above = int(offsets.max(initial=0)), int(-offsets.min(initial=0))
     if 2 * below + above + 1 >= n:
@@ -51,7 +51,7 @@ def _balanced(matrix: sparse.coo_matrix) -> sparse.coo_matrix:
     """Return the matrix with the largest entries of rows and columns near 1 [Ruiz 2001]."""
     rows, columns, data = matrix.row, matrix.col, matrix.data.astype(float)
     for _ in range(_ROUNDS):
-        for index, size in ((rows, matrix.shape[0]), (columns, matrix.shape[1])):
+        for index, size in zip((rows, columns), _shape(matrix), strict=True):
             largest = np.zeros(size)
             np.maximum.at(largest, index, np.abs(data))
             data = data / np.sqrt(np.where(largest > 0.0, largest, 1.0))[index]
@@ -66,3 +66,7 @@ def _narrow(matrix: sparse.coo_matrix) -> sparse.coo_matrix:
     return sparse.coo_matrix(
         (matrix.data, (place[matrix.row], place[matrix.col])), shape=matrix.shape
     )
+
+
+def _shape(matrix: sparse.coo_matrix) -> tuple[int, int]:
+    return cast("tuple[int, int]", matrix.shape)

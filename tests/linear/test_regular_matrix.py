@@ -17,9 +17,9 @@ from tests.solvers.problems import ends, point
 
 def banded(n: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    matrix = sp.diags([rng.normal(size=n - abs(k)) for k in range(-3, 4)], list(range(-3, 4)))
+    matrix = sum(np.diag(rng.normal(size=n - abs(k)), k) for k in range(-3, 4))
     order = rng.permutation(n)
-    return matrix.toarray()[order][:, order] + 8.0 * np.eye(n)
+    return np.asarray(matrix)[order][:, order] + 8.0 * np.eye(n)
 
 
 @settings(deadline=None, max_examples=25)

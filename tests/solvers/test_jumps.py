@@ -15,7 +15,13 @@ from ocp import (
     without_kinks,
 )
 from ocp.internal import jumps_along
-from solvers import Collocation, IndirectShooting, MultipleShooting, diagnose, multistart
+from solvers import (
+    Collocation,
+    IndirectShooting,
+    MultipleShooting,
+    diagnose,
+    multistart,
+)
 from solvers.diagnose.finding import Severity
 from solvers.internal import Cause
 

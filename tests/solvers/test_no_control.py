@@ -85,6 +85,7 @@ def coasting() -> OCP:
     ids=["free start", "given start", "discrete"],
 )
 def test_solved_or_refused_by_name(ocp, cost, solver, tmp_path):
+    refusal = ""
     try:
         found = solve(ocp, solver)
     except UnsupportedProblem as error:

@@ -79,7 +79,7 @@ def test_reaches_an_accuracy_from_an_inaccurate_start() -> None:
 
 
 def test_says_when_the_steps_run_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["solvers.polish"], "_MOST_STEPS", 700)
+    monkeypatch.setattr(sys.modules["solvers.indirect.step_halving"], "_MOST_STEPS", 700)
     extremal = polish(held(case_called("rayleigh")), accuracy=1e-13)
     assert extremal.status is Status.INACCURATE
     assert extremal.message.startswith("half of its 600 steps would change the cost by 1.7e-07")
