@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
+from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution, Work
 from ocp.solution.solver import InitialGuess, Program, Solver
 from ocp.solution.status import Status
@@ -60,7 +61,7 @@ class MethodProgram(Program):
         data = RunData.of(self.ocp, x0, t0, parameters)
         result = self._solve(data, self._first_guess(guess))
         seconds = perf_counter() - started
-        return Solution(
+        solution = Solution(
             problem=self.ocp,
             solver=self._solver_text,
             status=result.status,
@@ -80,6 +81,21 @@ class MethodProgram(Program):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
+        return self._without_false_success(solution)
+
+    @property
+    def _differentiates(self) -> bool:
+        """Whether the method uses derivatives along the trajectory."""
+        return True
+
+    def _without_false_success(self, solution: Solution) -> Solution:
+        """Return the solution, INACCURATE where it crosses a jump that derivatives miss."""
+        if not (solution.status.is_success and self._differentiates):
+            return solution
+        jumps = jumps_along(solution)
+        if not jumps:
+            return solution
+        return solution.with_(status=Status.INACCURATE, message=str(jumps[0]))
 
     @abstractmethod
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:

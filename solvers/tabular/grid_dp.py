@@ -192,6 +192,11 @@ class GridDPProgram(MethodProgram):
         """Return value function, policy and reachable sets for these data."""
         return self._tables(RunData.of(self.ocp, t0=t0, parameters=parameters))[-1]
 
+    @property
+    def _differentiates(self) -> bool:
+        """Bellman's recursion compares values."""
+        return False
+
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Fill the table, unless it is the last one, and follow its policy; no guess is used."""
         for value, axis, name in zip(data.x0, self.grid.axes, self.ocp.model.x_names, strict=True):
