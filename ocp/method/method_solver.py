@@ -4,6 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Self
 
+from ocp.checks.arguments import check_flag
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import Program, Solver
 
@@ -21,6 +22,10 @@ class MethodSolver(Solver):
     """
 
     judged: bool = field(default=True, kw_only=True, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check the option."""
+        check_flag(self.judged, f"{type(self).__name__}: judged")
 
     @abstractmethod
     def build(self, ocp: OCP) -> Program:

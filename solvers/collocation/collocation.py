@@ -79,6 +79,7 @@ class Collocation(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         CollocationPoints.of(self.points, self.degree)
         if self.mesh is None:
             check_whole(self.intervals, "mesh: intervals")

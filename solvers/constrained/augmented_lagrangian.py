@@ -77,6 +77,7 @@ class AugmentedLagrangian(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_instance(self.inner, Solver, "augmented Lagrangian: inner")
         check_whole(self.intervals, "augmented Lagrangian: intervals")
         check_whole(self.max_iterations, "augmented Lagrangian: max_iterations")

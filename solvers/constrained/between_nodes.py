@@ -62,6 +62,7 @@ class BetweenNodes(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_instance(self.inner, MultipleShooting, "between nodes: inner")
         check_whole(self.max_rounds, "between nodes: max_rounds")
         check_positive(self.tolerance, "between nodes: tolerance")

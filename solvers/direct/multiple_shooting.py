@@ -71,6 +71,7 @@ class MultipleShooting(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.intervals, "multiple shooting: intervals")
         check_instance(self.integrator, Integrator, "multiple shooting: integrator")
         check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)

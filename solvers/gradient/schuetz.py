@@ -70,6 +70,7 @@ class Schuetz(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.intervals, "Schuetz: intervals")
         check_whole(self.max_iterations, "Schuetz: max_iterations")
         check_instance(self.integrator, Integrator, "Schuetz: integrator")

@@ -64,6 +64,7 @@ class IndirectShooting(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.segments, "indirect shooting: segments")
         check_whole(self.steps, "indirect shooting: steps", least=self.segments)
         check_instance(self.integrator, Integrator, "indirect shooting: integrator")

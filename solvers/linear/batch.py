@@ -43,6 +43,7 @@ class Batch(MethodSolver):
 
     def __post_init__(self) -> None:
         """Check the option."""
+        super().__post_init__()
         check_flag(self.prestabilise, "Batch: prestabilise")
 
     def build(self, ocp: OCP) -> "BatchProgram":

@@ -63,6 +63,7 @@ class LinearMPC(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_choice(self.form, _FORMS, "LinearMPC: form")
         check_positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
         if self.soft is not None:

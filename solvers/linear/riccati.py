@@ -45,6 +45,7 @@ class Riccati(MethodSolver):
 
     def __post_init__(self) -> None:
         """Check the option."""
+        super().__post_init__()
         check_choice(self.horizon, ("finite", "infinite"), "Riccati: horizon")
 
     def build(self, ocp: OCP) -> "RiccatiProgram":

@@ -62,6 +62,7 @@ class Greedy(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.intervals, "Greedy: intervals")
         check_instance(self.integrator, Integrator, "Greedy: integrator")
         check_whole(self.max_iterations, "Greedy: max_iterations")

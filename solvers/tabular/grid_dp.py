@@ -85,6 +85,7 @@ class GridDP(MethodSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.intervals, "GridDP: intervals")
         check_instance(self.integrator, Integrator, "GridDP: integrator")
         for name in ("terminal_slack", "accuracy", "memory"):

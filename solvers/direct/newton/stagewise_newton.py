@@ -67,6 +67,7 @@ class StagewiseNewton(ScalingSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.intervals, "stagewise Newton: intervals")
         check_whole(self.max_iterations, "stagewise Newton: max_iterations")
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")

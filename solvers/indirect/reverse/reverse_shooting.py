@@ -81,6 +81,7 @@ class ReverseShooting(MethodSolver):
 
     def __post_init__(self) -> None:
         """Check the options."""
+        super().__post_init__()
         check_whole(self.steps, "reverse shooting: steps")
         check_whole(self.max_steps, "reverse shooting: max_steps")
         check_instance(self.integrator, Integrator, "reverse shooting: integrator")
