@@ -185,7 +185,7 @@ class NlpRun:
         first = self.first_solve(inputs, chosen)
         if nlp is None and self._has_dependent_rows(inputs, first):
             return self._run_to_an_optimum(inputs, self._for_dependent_rows).after(first)
-        if first.status is not Status.SOLVED:
+        if first.status is not Status.SOLVED or not problem.ocp.model.nu:
             return first
         still = unmoved(problem, inputs, first.last.w)
         if still.all():

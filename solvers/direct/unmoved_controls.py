@@ -13,8 +13,6 @@ _UNCHANGED = 1e-6
 
 def unmoved(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> np.ndarray:
     """Return which controls are those of the first iterate all along the horizon, bool (nu,)."""
-    if not problem.ocp.model.nu:
-        return np.zeros(0, dtype=bool)
     before, after = (_controls(problem, each) for each in (inputs.w0, w))
     changed = np.abs(after - before) > _UNCHANGED * (1.0 + np.abs(before))
     return ~np.asarray(changed.any(axis=0))

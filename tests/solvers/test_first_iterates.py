@@ -1,7 +1,6 @@
 """First iterates of direct methods: tame roll-outs, other durations, starts without a slope."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -47,7 +46,7 @@ def test_an_unstable_system_is_solved_as_from_rest(
     horizon: float, method: Callable[[int], Solver]
 ) -> None:
     # Open loop, rounding grows by e^60 over the longer horizon: judged, neither is a success.
-    ocp, sized = upright(horizon), replace(method(int(20 * horizon)), judged=False)
+    ocp, sized = upright(horizon), method(int(20 * horizon)).unjudged()
     own = solve(ocp, sized)
     at_rest = solve(ocp, sized, guess=Guess(x=[0.0, 0.0], u=[0.0]))
     assert own.status is at_rest.status is Status.SOLVED
