@@ -16,6 +16,7 @@ from ocp.problem.functions import stacked
 from ocp.problem.kinks import kink_in_control
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
+from ocp.problem.scaled import scaled
 
 # H_uu with a smaller reciprocal condition number does not determine the control.
 _SINGULAR = 1e-10
@@ -116,13 +117,20 @@ def _require_regular(ocp: OCP, h: Hamiltonian) -> None:
 
 
 def _probed_curvatures(ocp: OCP, h: Hamiltonian) -> list[np.ndarray]:
-    """H_uu at the start, for no costate and no control and for a few random ones."""
+    """H_uu at the start, for no costate and no control and for a few random ones.
+
+    Of a problem that is badly scaled in the sizes of cost, states and controls.
+    """
     m, rng = ocp.model, np.random.default_rng(0)
     p = ocp.parameter_values().at(0.0)[0]
-    costates = [np.zeros(m.nx), *rng.normal(size=(5, m.nx))]
-    controls = [np.zeros(m.nu), *rng.normal(size=(5, m.nu))]
+    x, u, cost = np.ones(m.nx), np.ones(m.nu), 1.0
+    if (in_sizes := scaled(ocp)) is not None:
+        x, u, cost = in_sizes.sizes.x, in_sizes.sizes.u, in_sizes.sizes.cost
+    costates = [np.zeros(m.nx), *rng.normal(size=(5, m.nx)) * (cost / x)]
+    controls = [np.zeros(m.nu), *rng.normal(size=(5, m.nu)) * u]
     probes = zip(costates, ocp.control_bounds.clip(np.array(controls)), strict=True)
-    return [np.array(h.control_curvature(ocp.start(), u, c, 0.0, p)) for c, u in probes]
+    found = [np.array(h.control_curvature(ocp.start(), v, c, 0.0, p)) for c, v in probes]
+    return [curvature * np.outer(u, u) / cost for curvature in found]
 
 
 def _flow(ocp: OCP, control: ca.Function, h: Hamiltonian) -> ca.Function:

@@ -17,8 +17,9 @@ from ocp.problem.ocp import OCP
 from ocp.referee.control_integrators import Integrated, Restarts, Steps
 from ocp.solution.solution import Solution
 
-# No step is longer than this fraction of an interval, nor are there more steps in it.
-_LONGEST_STEP = 0.05
+# No step is longer than this fraction of an interval (an odd one: no wave is in step with it),
+# nor are there more steps in it.
+_LONGEST_STEP = 0.0437
 _MOST_STEPS = 20_000
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 
-# Twice the prime numbers that grow by about 1.6: a periodic function that two such grids cannot
-# tell from a constant has at least as many periods in an interval as the product of both. Even,
-# so that the middle of an interval, where rows often peak, is always looked at.
+# Twice the prime numbers that grow by about 1.6: no two grids share instants but the ends and the
+# middle of an interval, where rows often peak; and steps are uneven, in step with no wave.
 _SUBSTEPS = (2, 4, 6, 10, 14, 22, 38, 62, 106, 178, 298, 478, 766, 1226, 1966, 3158, 5062, 8102)
 _SUBSTEPS = (*_SUBSTEPS, 12982, 20782, 33262)
 # The first grid has at least this many steps over the horizon.

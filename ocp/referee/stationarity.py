@@ -172,7 +172,11 @@ def _time_residual(
         + (at[3].ravel() - truth.t[0]) * np.array(h.time_slope.map(steps)(*at, p.T)).ravel()
         for at, p in ((now, truth.p_start), (then, truth.p_end))
     )
-    mean = (left[::2] + 4.0 * right[::2] + right[1::2]) @ np.diff(truth.t)[::2] / 3.0
+    first, second = np.diff(truth.t)[::2], np.diff(truth.t)[1::2]
+    both = first + second
+    weights = (2.0 - second / first, both**2 / (first * second), 2.0 - first / second)
+    values = (left[::2], right[::2], right[1::2])
+    mean = sum((w * v) @ both for w, v in zip(weights, values, strict=True)) / 6.0
     duration = np.array([solution.duration])
     slope = mean / solution.duration + at_end
     return float(np.abs(duration - ocp.time_box.clip(duration - slope))[0])
