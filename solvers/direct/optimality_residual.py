@@ -6,6 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from ocp.internal import BufferedFunction
 from solvers.direct.nlp_backends import NlpResult
 
 # Values that agree to this are the same: unknowns are clipped to their bounds.
@@ -50,10 +51,12 @@ class OptimalityCheck:
             bounds: lbx, ubx, lbg, ubg.
         """
         w, free = result.w, bounds["lbx"] < bounds["ubx"]
-        cost = self._cost(x=w, p=p)["grad_f_x"]
-        lagrangian = self._lagrangian(x=w, p=p, lam_f=1.0, lam_g=result.lam_g)["grad_gamma_x"]
-        slope = np.array(lagrangian).ravel() + result.lam_x
-        sizes = (np.array(cost).ravel()[free], result.lam_g, result.lam_x[free])
+        *_, cost = self._cost(
+            w, p
+        )  # fatrop's returns the gradient alone, IPOPT's the cost before it
+        _, _, lagrangian, _ = self._lagrangian(w, p, 1.0, result.lam_g)
+        slope = lagrangian.ravel() + result.lam_x
+        sizes = (cost.ravel()[free], result.lam_g, result.lam_x[free])
         return OptimalityResidual(_largest(slope[free]), max(map(_largest, sizes)))
 
     def is_value(self, result: NlpResult, p: np.ndarray) -> bool:
@@ -61,18 +64,18 @@ class OptimalityCheck:
 
         A backend that fails at once returns zeros for what it has not evaluated.
         """
-        at = self._lagrangian(x=result.w, p=p, lam_f=1.0, lam_g=np.zeros_like(result.g))
-        cost, g = float(at["f"]), np.array(at["g"]).ravel()
+        f, values, _, _ = self._lagrangian(result.w, p, 1.0, np.zeros_like(result.g))
+        cost, g = f.item(), values.ravel()
         is_cost = abs(cost - result.cost) <= _SAME * (1.0 + abs(cost))
         return bool(is_cost and (np.abs(g - result.g) <= _SAME * (1.0 + np.abs(g))).all())
 
     @cached_property
-    def _cost(self) -> ca.Function:
-        return self.function.get_function("nlp_grad_f")
+    def _cost(self) -> BufferedFunction:
+        return BufferedFunction(self.function.get_function("nlp_grad_f"))
 
     @cached_property
-    def _lagrangian(self) -> ca.Function:
-        return self.function.get_function("nlp_grad")
+    def _lagrangian(self) -> BufferedFunction:
+        return BufferedFunction(self.function.get_function("nlp_grad"))
 
 
 def _largest(values: np.ndarray) -> float:
