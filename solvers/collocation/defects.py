@@ -56,22 +56,22 @@ class Defects:
             data: of the run.
 
         Returns:
-            the largest defect between two nodes, relative to the size of a state + its largest
-            abs(x) along the trajectory, (N,), and the running cost between them, (N,).
+            the largest defect between two nodes, relative to the size of a state, 1 at most, + its
+            largest abs(x) along the trajectory, (N,), and the running cost between them, (N,).
         """
         nodes, inside = self.grid.nodes, np.arange(_STEPS) / _STEPS
         fine = (nodes[:-1, None] + inside * np.diff(nodes)[:, None]).ravel()
         schedule = self._schedule(u, duration, data, np.append(fine, 1.0))
         steps, costs = self.between(x[:-1].T, *schedule)
         after = steps[:, _STEPS - 1 :: _STEPS].T
-        moved = np.abs(after - x[1:]) / (self._sizes.x + np.abs(x).max(axis=0))
+        moved = np.abs(after - x[1:]) / (np.minimum(self._sizes.x, 1.0) + np.abs(x).max(axis=0))
         return moved.max(axis=1), costs.reshape(-1, _STEPS).sum(axis=1)
 
     def errors(self, solution: Solution) -> np.ndarray:
         """Return the error of each interval of a solution on this grid, (K,).
 
         Its largest relative defect, or the difference of the running cost from the
-        quadrature of the interval, relative to the size of the cost + abs(cost).
+        quadrature of the interval, relative to the size of the cost, 1 at most, + abs(cost).
         """
         begins = self.grid.edge_nodes[:-1]
         given = (solution.x, solution.u, solution.duration, solution.data)
@@ -79,7 +79,7 @@ class Defects:
         of_cost = np.add.reduceat(costs, begins) - self._quadrature(*given)
         return np.maximum(
             np.maximum.reduceat(moved, begins),
-            np.abs(of_cost) / (self._sizes.cost + abs(solution.cost)),
+            np.abs(of_cost) / (min(self._sizes.cost, 1.0) + abs(solution.cost)),
         )
 
     def _quadrature(

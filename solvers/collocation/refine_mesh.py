@@ -36,8 +36,7 @@ class MeshRound:
     Attributes:
         mesh: the mesh.
         errors: of each interval: by how much the dynamics, integrated from node to node, miss
-            the polynomial, relative to 1 + abs(x), or the running cost its quadrature, relative
-            to 1 + abs(cost), (K,).
+            the polynomial, or the running cost its quadrature, see ``Defects.errors``, (K,).
         solution: of this round alone.
     """
 

@@ -86,7 +86,7 @@ class BetweenNodes(ScalingSolver):
             )
         rows = StandardForm.along(ocp)
         tightened = _tightened(ocp, rows, self.inner.intervals)
-        return BetweenNodesProgram(self, ocp, rows, self.inner.unjudged().build(tightened))
+        return BetweenNodesProgram(self, ocp, rows, self.inner.unjudged().prepare(tightened))
 
 
 @dataclass(frozen=True, eq=False)

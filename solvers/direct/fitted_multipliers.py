@@ -1,6 +1,7 @@
 """Multipliers fitted to a point: how close to an optimum it is, whatever a backend's own say."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -36,7 +37,7 @@ def with_fitted_multipliers(
     terms: for the controls and for the states on their own, so that it depends neither on the
     number of intervals nor on the unit of the cost. Multipliers of the wrong sign are dropped.
     Where the point is not on an active bound, the sum of multiplier times distance counts, relative
-    to the cost.
+    to the cost. Where the backend's own multipliers leave less they are kept.
 
     Args:
         function: the ``casadi.nlpsol``.
@@ -66,16 +67,39 @@ def with_fitted_multipliers(
         if not wrong.any():
             break
         active &= ~wrong
-    left = np.abs(gradient + rows.T @ fitted)
-    terms = np.abs(gradient) + abs(rows).T @ np.abs(fitted)
-    distance = np.where(fitted > 0.0, upper - values, values - lower)
-    gap = np.abs(fitted[active] * distance[active]).sum()
-    residual = max(
-        _share(left[is_control], terms[is_control]),
-        _share(left[~is_control], terms[~is_control]),
-        _share(gap, abs(result.cost) + np.abs(gradient * w).max()),
-    )
-    return replace(result, lam_g=fitted[:count], lam_x=fitted[count:], residual=residual)
+    program = _Program(gradient, rows, values, lower, upper)
+    own = np.concatenate([result.lam_g, result.lam_x])
+    candidates = [(program.residual(each, result, is_control), each) for each in (fitted, own)]
+    residual, chosen = min(candidates, key=lambda pair: pair[0])
+    return replace(result, lam_g=chosen[:count], lam_x=chosen[count:], residual=residual)
+
+
+class _Program(NamedTuple):
+    """Gradients of cost and rows at a point, and the rows' values and bounds."""
+
+    gradient: np.ndarray
+    rows: csr_matrix
+    values: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def residual(self, multipliers: np.ndarray, result: NlpResult, is_control: np.ndarray) -> float:
+        """Return how far these multipliers are from the first-order conditions."""
+        left = np.abs(self.gradient + self.rows.T @ multipliers)
+        terms = np.abs(self.gradient) + abs(self.rows).T @ np.abs(multipliers)
+        above, below = np.maximum(multipliers, 0.0), np.maximum(-multipliers, 0.0)
+        gap = _worth(above, self.upper - self.values) + _worth(below, self.values - self.lower)
+        return max(
+            _share(left[is_control], terms[is_control]),
+            _share(left[~is_control], terms[~is_control]),
+            _share(gap, abs(result.cost) + np.abs(self.gradient * result.w).max()),
+        )
+
+
+def _worth(multipliers: np.ndarray, distance: np.ndarray) -> float:
+    """Return the sum of multiplier times distance; inf where a bound is none."""
+    counts = multipliers > 0.0
+    return float(np.abs(multipliers[counts] * distance[counts]).sum())
 
 
 def _fit(rows: csr_matrix, wanted: np.ndarray) -> np.ndarray:
