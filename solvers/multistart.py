@@ -109,8 +109,8 @@ def _is_same(one: LocalOptimum, other: LocalOptimum) -> bool:
     """Whether cost and states agree: a mirror image has the same cost."""
     if abs(one.cost - other.cost) > _SAME_COST * (1.0 + abs(one.cost)):
         return False
-    x, y = one.solution.x, other.solution.x
-    return bool(np.abs(x - y).max() <= _SAME_STATES * (1.0 + np.abs(x).max()))
+    size = 1.0 + np.abs(one.solution.x).max()
+    return bool(one.solution.states_apart(other.solution) <= _SAME_STATES * size)
 
 
 def _merged(found: list[LocalOptimum], new: LocalOptimum) -> list[LocalOptimum]:

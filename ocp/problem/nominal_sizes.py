@@ -29,6 +29,8 @@ _BOUND, _GIVEN, _DYNAMICS, _RATE, _COST, _ROW = 2.0, 1.0, 1.0, 0.2, 0.3, 0.5
 _ROUNDING = 1e-9
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
+# A row has at least this part of its distance from the bounds as its size.
+_OF_DISTANCE = 0.1
 # Where along the guess derivatives are taken.
 _FRACTIONS = np.array([0.0, 0.5, 1.0])
 
@@ -188,12 +190,20 @@ class _Functions:
                 yield _Equation(_COST, (cost,), (j,), float(np.log(share * abs(slope[j]))))
 
     def row_sizes(self, c: Constraint, points: Iterable[_Point], w: np.ndarray) -> np.ndarray:
-        """Return how much each row of a constraint changes along the sizes of x and u."""
+        """Return how much each row of a constraint changes along the sizes of x and u.
+
+        One that hardly changes near the points is measured by its distance from the bounds.
+        """
         if c.nominal is not None:
             return np.broadcast_to(np.asarray(c.nominal, dtype=float), c.size).copy()
-        moved = [abs(np.array(self.constraints[c.name][1](*point)[1])) * w for point in points]
-        largest = np.max([np.where(np.isfinite(m), m, 0.0).max(axis=1) for m in moved], axis=0)
-        return np.where(largest > 0.0, largest, 1.0)
+        changes, distances = [], []
+        for point in points:
+            value, jacobian = (np.array(v) for v in self.constraints[c.name][1](*point))
+            moved = np.abs(jacobian) * w
+            changes.append(np.where(np.isfinite(moved), moved, 0.0).max(axis=1))
+            distances.append(_distance(c, value.ravel()))
+        sizes = np.maximum(np.max(changes, axis=0), _OF_DISTANCE * np.min(distances, axis=0))
+        return np.where(sizes > 0.0, sizes, 1.0)
 
 
 def _points(ocp: OCP) -> list[_Point]:
@@ -237,6 +247,13 @@ def _given(ocp: OCP) -> Iterator[_Equation]:
         largest = np.abs(samples).max(axis=0)
         for j in np.flatnonzero(_usable(largest)).tolist():
             yield _Equation(weight, (first + j,), (), float(np.log(largest[j])))
+
+
+def _distance(c: Constraint, value: np.ndarray) -> np.ndarray:
+    """Return how far the rows of a constraint are from the nearest bound; 0 where unknown."""
+    sides = np.vstack([np.asarray(c.lower, float), np.asarray(c.upper, float)]) - value
+    nearest = np.abs(sides).min(axis=0)
+    return np.where(np.isfinite(nearest), nearest, 0.0)
 
 
 def _offset(c: Constraint, value: np.ndarray) -> np.ndarray:

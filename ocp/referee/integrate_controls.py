@@ -13,6 +13,8 @@ from ocp.solution.solution import Solution
 # largest one bound the error, which falls by less than the tolerance does.
 _TOLERANCES = (1e-7, 1e-8, 1e-9)
 _OF_LAST, _OF_LARGEST = 2.0, 0.25
+# Differences below this part of the last tolerance are chance, and bound nothing.
+_CHANCE = 1e-2
 # And is looked at this often over the horizon, at least.
 _FEWEST_SAMPLES = 400
 # A finite trajectory of more intervals is left to explicit steps: CVODES begins anew in each.
@@ -80,5 +82,5 @@ def _implicit(replayed: Replayed) -> ReferenceTrajectory:
             return found[-1]
     first, before, last = found
     changes = _OF_LAST * abs(last.cost - before.cost), _OF_LARGEST * abs(last.cost - first.cost)
-    error = max(changes) + ROUNDING * last.cost_size
+    error = max(*changes, _CHANCE * _TOLERANCES[-1] * last.cost_size) + ROUNDING * last.cost_size
     return replace(last, cost_error=error, end_error=end_moved(before, last))

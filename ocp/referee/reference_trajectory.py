@@ -37,7 +37,7 @@ class ReferenceTrajectory:
         substeps: steps in every interval between two knots.
         replay: ``"open loop"``: from the start to the end; ``"by segments"``: from each node of
             the solution to the next, for dynamics that amplify every rounding error.
-        method: ``"explicit"``: RK4 in equal steps; ``"implicit"``: CVODES.
+        method: ``"explicit"``: RK4, in steps that are a little uneven; ``"implicit"``: CVODES.
         escape: when the state leaves the finite numbers, if it surely does [s].
     """
 

@@ -249,6 +249,15 @@ class Solution:
             )
         return values
 
+    def states_apart(self, other: "Solution") -> float:
+        """Return the largest distance from the states of another at the nodes of the coarser grid.
+
+        Taken at the same fractions of both horizons.
+        """
+        coarse, fine = sorted((self, other), key=lambda solution: len(solution.t))
+        there = fine.sample("x", coarse.fractions, coarse.x.shape[1])
+        return float(np.abs(coarse.x - there).max())
+
     def _canonical(self, t: np.ndarray) -> np.ndarray:
         """State and costate of an extremal."""
         return self._cubics(np.clip(t, self.t[0], self.t[-1]))

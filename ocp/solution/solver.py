@@ -71,6 +71,13 @@ class Solver(ABC):
             UnsupportedProblem: naming the term that this method cannot treat.
         """
 
+    def prepare(self, ocp: OCP) -> Program:
+        """Build it for a problem whose sizes are chosen already, as a method around this one does.
+
+        Here the same as ``build``; see ``ScalingSolver``.
+        """
+        return self.build(ocp)
+
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Solver":
         """Return the solver as ``MPC`` runs it; here as it is.
 

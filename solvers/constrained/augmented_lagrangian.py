@@ -61,7 +61,8 @@ class AugmentedLagrangian(ScalingSolver):
         penalty: ρ of the first round.
         growth: factor by which it is raised.
         largest_penalty: and up to where.
-        tolerance: on the referee's violation, in the units of the constraints.
+        tolerance: on the referee's violation, in the units of the constraints; in their sizes
+            where the problem is scaled, see ``Solution.sizes``.
         complementarity: on :math:`\int \mu |c| dt` relative to 1 + abs(cost).
         max_iterations: limit of rounds.
     """
@@ -117,7 +118,7 @@ class AugmentedLagrangian(ScalingSolver):
                 f"{ocp.name}: there is no path, state or terminal constraint to relax; use "
                 f"{type(self.inner).__name__} itself"
             )
-        inner = self.inner.unjudged().build(relaxed.ocp)
+        inner = self.inner.unjudged().prepare(relaxed.ocp)
         return AugmentedLagrangianProgram(self, ocp, relaxed, inner)
 
 

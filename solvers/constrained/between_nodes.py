@@ -52,7 +52,8 @@ class BetweenNodes(ScalingSolver):
 
     Args:
         inner: the direct solver.
-        tolerance: on the referee's violation, in the units of the constraints.
+        tolerance: on the referee's violation, in the units of the constraints; in their sizes
+            where the problem is scaled, see ``Solution.sizes``.
         max_rounds: limit of runs of the inner solver on each grid.
     """
 

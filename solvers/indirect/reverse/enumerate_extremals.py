@@ -216,6 +216,6 @@ def _exact(
 def _distinct(solutions: list[Solution]) -> list[Solution]:
     kept: list[Solution] = []
     for solution in solutions:
-        if all(np.abs(solution.x - other.x).max() > _SAME for other in kept):
+        if all(solution.states_apart(other) > _SAME for other in kept):
             kept.append(solution)
     return kept
