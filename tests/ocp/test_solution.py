@@ -71,6 +71,14 @@ def test_linear_controls_states_and_costates() -> None:
     assert solution.duration == 1.0
 
 
+def test_states_are_compared_at_the_nodes_of_the_coarser_grid() -> None:
+    coarse = trajectory(integrator(), np.zeros((2, 1)), x=np.array([[0.0], [1.0], [3.0]]))
+    fine = trajectory(
+        integrator(), np.zeros((4, 1)), x=np.array([[0.0], [9.0], [1.5], [9.0], [3.0]])
+    )
+    assert coarse.states_apart(fine) == fine.states_apart(coarse) == pytest.approx(0.5)
+
+
 def extremal(ocp: OCP) -> Solution:
     program = IndirectShooting(segments=5, steps=320).build(ocp)
     return program.run(guess=solve(ocp, MultipleShooting(intervals=20))).or_raise()

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import all_cases
-from models.textbook import van_der_pol
+from models.textbook import goddard, van_der_pol
 from ocp import OCP, Box, Constraint, Model, ProblemError, Solver, Status, evaluate, solve
+from ocp.method.scaled_program import ScaledProgram
 from ocp.problem.scaled import scaled, sizes_of
 from solvers import (
+    BetweenNodes,
     Collocation,
     IndirectShooting,
     LinearMPC,
@@ -164,6 +166,27 @@ def test_sizes_follow_the_units() -> None:
         np.testing.assert_allclose(other.x, sizes.x * units.x, rtol=1e-6)
         np.testing.assert_allclose(other.u, sizes.u * units.u, rtol=1e-6)
         assert other.cost == pytest.approx(sizes.cost * units.cost, rel=1e-6)
+
+
+def test_a_row_that_hardly_changes_is_measured_by_its_distance_from_the_bound() -> None:
+    """Not by its slope of 1e-7, for which alone the whole problem would be scaled."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    model = Model(name="m", x=x, u=u, f=u)
+    row = Constraint("clearance", ca.vertcat(x, 1e-7 * x + 0.5), lower=[-1.0, 0.1])
+    ocp = OCP(
+        name="m", model=model, x0=[1.0], horizon=1.0, running_cost=u**2 + x**2, constraints=(row,)
+    )
+    assert sizes_of(ocp).rows["clearance"][1] == pytest.approx(0.04, rel=1e-3)
+    assert scaled(ocp) is None
+
+
+def test_a_method_around_a_method_chooses_the_sizes() -> None:
+    """The tightened problem, whose rows have other sizes, is not scaled again."""
+    ocp = goddard()
+    assert scaled(ocp) is None
+    program = BetweenNodes().build(ocp)
+    assert scaled(program.inner.ocp) is not None
+    assert not isinstance(program.inner, ScaledProgram)
 
 
 def test_what_the_user_declares_is_the_size() -> None:
