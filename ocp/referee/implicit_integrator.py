@@ -18,21 +18,22 @@ from ocp.referee.control_integrators import Integrated, Restarts, Steps
 from ocp.solution.solution import Solution
 
 # No step is longer than this fraction of an interval (an odd one: no wave is in step with it),
-# nor are there more steps in it.
+# nor are there more steps in it; over the horizon they take a few seconds.
 _LONGEST_STEP = 0.0437
 _MOST_STEPS = 20_000
+_MOST_STEPS_OF_ALL = 600_000
 
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """The integrators of a problem, by kind of control, samples an interval and tolerance."""
+    """The integrators of a problem, by kind of control, samples an interval, tolerance, limit."""
 
     ocp: OCP
-    built: dict[tuple[int, int, float], ca.Function] = field(default_factory=dict)
+    built: dict[tuple[int, int, float, int], ca.Function] = field(default_factory=dict)
 
-    def of(self, count: int, samples: int, tolerance: float) -> ca.Function:
+    def of(self, count: int, samples: int, tolerance: float, most_steps: int) -> ca.Function:
         """Return the integrator over one interval; a count of 0 means an extremal."""
-        key = (count, samples, tolerance)
+        key = (count, samples, tolerance, most_steps)
         if key not in self.built:
             self.built[key] = _piece(self.ocp, *key)
         return self.built[key]
@@ -68,7 +69,8 @@ def integrate_implicitly(
     control = _Extremal(solution) if is_extremal else _Known(solution)
     t, nx = steps.t[::substeps], solution.problem.model.nx
     drive = control.drive(t)
-    piece = _pieces(solution.problem).of(control.count, substeps, tolerance)
+    most_steps = min(_MOST_STEPS, _MOST_STEPS_OF_ALL // len(drive))
+    piece = _pieces(solution.problem).of(control.count, substeps, tolerance, most_steps)
     ends = np.full((len(steps.p_start), control.width), np.nan)
     x, costs = np.full((len(ends) + 1, control.width), np.nan), np.full(len(ends), np.nan)
     w, size, cost_size = control.begin(start, t[0]), control.sizes, _cost_size(solution)
@@ -195,7 +197,7 @@ class _Extremal:
         return u_start, u_end
 
 
-def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
+def _piece(ocp: OCP, count: int, samples: int, tolerance: float, most_steps: int) -> ca.Function:
     """(x0, p) -> xf, qf: states and running cost at samples of one interval, by their sizes."""
     rate = _extremal_rate(ocp) if count == 0 else _known_rate(ocp, count)
     kind = symbol_type(rate)
@@ -210,7 +212,7 @@ def _piece(ocp: OCP, count: int, samples: int, tolerance: float) -> ca.Function:
         "abstol": tolerance,
         "quad_err_con": True,
         "max_step_size": _LONGEST_STEP,
-        "max_num_steps": _MOST_STEPS,
+        "max_num_steps": most_steps,
         "disable_internal_warnings": True,
         "show_eval_warnings": False,
     }
