@@ -7,7 +7,7 @@ import pytest
 from benchmarks.cases import all_cases
 from models.textbook import goddard, van_der_pol
 from ocp import OCP, Box, Constraint, Model, ProblemError, Solver, Status, evaluate, solve
-from ocp.method.scaled_program import ScaledProgram
+from ocp.internal import MethodProgram
 from ocp.problem.scaled import scaled, sizes_of
 from solvers import (
     BetweenNodes,
@@ -18,6 +18,7 @@ from solvers import (
     StagewiseNewton,
     polish,
 )
+from solvers.constrained.between_nodes import BetweenNodesProgram
 from tests.units.changed_units import Units
 
 # Left out: where the minimum is so flat (fuller, beam: singular arcs) or the grid so coarse
@@ -185,8 +186,8 @@ def test_a_method_around_a_method_chooses_the_sizes() -> None:
     ocp = goddard()
     assert scaled(ocp) is None
     program = BetweenNodes().build(ocp)
-    assert scaled(program.inner.ocp) is not None
-    assert not isinstance(program.inner, ScaledProgram)
+    assert isinstance(program, BetweenNodesProgram)
+    assert isinstance(program.inner, MethodProgram)  # and no ScaledProgram
 
 
 def test_what_the_user_declares_is_the_size() -> None:
