@@ -20,8 +20,8 @@ from ocp.mpc.mpc import MPC
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.record_format import Record, records
 from ocp.problem.constraint import Box, Constraint
+from ocp.problem.epigraph import without_kinks
 from ocp.problem.guess import Guess
-from ocp.problem.kinks import without_kinks
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP, FreeTime
 from ocp.problem.parameters import Parameter, Signal

@@ -21,17 +21,14 @@ from ocp.linear.stationary import stationary
 from ocp.method.judged import judged
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
-from ocp.method.scaled_program import (
-    ScaledProgram,
-    ScalingSolver,
-    in_original_units,
-    in_own_units,
-)
+from ocp.method.scaled_program import ScaledProgram, in_original_units, in_own_units
+from ocp.method.scaling_solver import ScalingSolver
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
+from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
@@ -46,6 +43,7 @@ __all__ = [
     "BufferedFunction",
     "ConstraintRow",
     "ConstraintRows",
+    "Epigraph",
     "Jump",
     "LQData",
     "LinearQuadratic",
@@ -77,6 +75,7 @@ __all__ = [
     "compiled",
     "differentiable_step",
     "elevated",
+    "epigraph",
     "hamiltonian",
     "in_original_units",
     "in_own_units",

@@ -1,6 +1,5 @@
 """Solve a problem in sizes of its own, and return the solution in the units of the user."""
 
-from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
@@ -8,38 +7,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_instance
-from ocp.method.method_solver import MethodSolver
 from ocp.problem.nominal_sizes import Sizes
-from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
-from ocp.problem.scaled import ScaledOCP, scaled
+from ocp.problem.scaled import ScaledOCP
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
-
-
-@dataclass(frozen=True)
-class ScalingSolver(MethodSolver):
-    """A solver that iterates on numbers, and so measures a problem in sizes of its own.
-
-    Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.
-    """
-
-    def build(self, ocp: OCP) -> Program:
-        """Do all symbolic work; a problem that is badly scaled is scaled first.
-
-        Raises:
-            UnsupportedProblem: naming the term that this method cannot treat.
-        """
-        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
-        in_sizes = scaled(ocp)
-        if in_sizes is None:
-            return self.prepare(ocp)
-        return ScaledProgram(in_sizes, self.prepare(in_sizes))
-
-    @abstractmethod
-    def prepare(self, ocp: OCP) -> Program:
-        """Do all symbolic work for a problem in the units it is written in."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp import OCP, InitialGuess, Solution, Status, UnsupportedProblem
 from ocp.internal import (
+    Epigraph,
     MethodProgram,
     RunData,
     RunResult,
@@ -15,6 +16,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     elevated,
+    epigraph,
     segment_gaps,
 )
 from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
@@ -112,6 +114,10 @@ class Collocation(ScalingSolver):
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
         return replace(self, time_limit=limit, judged=False)
+
+    def smooth_form(self, ocp: OCP) -> Epigraph | None:
+        """Replace every kink: slacks and maxima meet at the collocation points."""
+        return epigraph(ocp)
 
     def prepare(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.

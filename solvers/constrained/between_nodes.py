@@ -23,7 +23,14 @@ from ocp import (
     UnsupportedProblem,
     evaluate,
 )
-from ocp.internal import ScalingSolver, check_instance, check_positive, check_whole, judged
+from ocp.internal import (
+    Epigraph,
+    ScalingSolver,
+    check_instance,
+    check_positive,
+    check_whole,
+    judged,
+)
 from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
 
@@ -72,6 +79,10 @@ class BetweenNodes(ScalingSolver):
         """Set what is left open; see ``Solver``."""
         inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
         return replace(self, inner=inner)
+
+    def smooth_form(self, ocp: OCP) -> Epigraph | None:
+        """Replace what the inner solver would."""
+        return self.inner.smooth_form(ocp)
 
     def prepare(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ocp import OCP, RK4, InitialGuess, Integrator
 from ocp.internal import (
+    Epigraph,
     MethodProgram,
     RunData,
     RunResult,
@@ -17,6 +18,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    epigraph,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
@@ -99,6 +101,10 @@ class MultipleShooting(ScalingSolver):
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
         return replace(self, compiled=compiled or self.compiled, time_limit=limit, judged=False)
+
+    def smooth_form(self, ocp: OCP) -> Epigraph | None:
+        """Replace the kinks that a held control decides."""
+        return epigraph(ocp, held=True)
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

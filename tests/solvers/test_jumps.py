@@ -8,14 +8,18 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Guess,
     Model,
+    Parameter,
     ProblemError,
     UnsupportedProblem,
+    evaluate,
     solve,
     without_kinks,
 )
 from ocp.internal import jumps_along
 from solvers import (
+    BetweenNodes,
     Collocation,
     IndirectShooting,
     MultipleShooting,
@@ -132,6 +136,88 @@ def test_maxima_minima_and_sums_are_written_without_kinks():
 def test_what_is_not_convex_is_refused(cost, said):
     with pytest.raises(UnsupportedProblem, match=said):
         without_kinks(fuel(cost))
+
+
+def test_what_is_convex_is_replaced_and_the_rest_stays():
+    both = without_kinks(fuel(ca.fabs(U) + ca.fmax(V - 1, 0) ** 2, smoothness=1))
+    assert both.model.nu == 2
+    assert both.smoothness == 1
+    assert without_kinks(fuel(ca.fabs(U))).smoothness == 2
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [
+        MultipleShooting(100),
+        MultipleShooting(100, backend="fatrop"),
+        Collocation(50),
+        BetweenNodes(MultipleShooting(100)),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("smoothness", [0, 2])
+def test_direct_solvers_replace_kinks_by_themselves(solver, smoothness):
+    kinked = fuel(ca.fabs(U), smoothness=smoothness)
+    found = solve(kinked, solver)
+    assert found.status.is_success, found.message
+    assert found.problem is kinked
+    assert found.u.shape[1] == 1
+    assert found.cost == pytest.approx(FUEL, rel=1e-3)
+    assert evaluate(found).cost == pytest.approx(FUEL, rel=1e-3)
+
+
+def test_a_kink_is_solved_from_any_guess():
+    kinked = fuel(ca.fabs(U))
+    guesses = [
+        Guess(u=[0.0]),
+        Guess(x=[[0, 0], [1, 0]], u=[[6.0], [-6.0]]),
+        solve(kinked, Collocation(20)),
+    ]
+    for guess in guesses:
+        found = solve(kinked, MultipleShooting(100), guess=guess)
+        assert found.cost == pytest.approx(FUEL, rel=1e-3)
+    best = multistart(kinked, MultipleShooting(100), starts=3, seed=0)
+    assert [optimum.found for optimum in best] == [3]
+
+
+def test_a_price_may_change_its_sign_from_run_to_run():
+    price = ca.SX.sym("price")
+    asked = fuel(
+        price * ca.fabs(U) + U**2, parameters=(Parameter("price", price, 1.0),), smoothness=0
+    )
+    program = MultipleShooting(40).build(asked)
+    dear, paid = program.run(), program.run(parameters={"price": -0.5})
+    assert dear.status.is_success
+    assert dear.cost == pytest.approx(evaluate(dear).cost)
+    assert paid.cost == pytest.approx(evaluate(paid).cost)
+    assert paid.cost < program.run(parameters={"price": 0.0}).cost < dear.cost
+
+
+def test_what_a_held_slack_cannot_follow_stays_as_it_is():
+    """A slack that is held misses the integral of abs(x), so only Collocation replaces it."""
+    asked = ride(0.0, ca.fabs(X - FAR) + 1e-2 * U**2)
+    direct, collocated = solve(asked, MultipleShooting(100)), solve(asked, Collocation(50))
+    for found in (direct, collocated):
+        assert found.status.is_success, found.message
+        assert found.cost == pytest.approx(evaluate(found).cost, rel=1e-3)
+    assert direct.cost == pytest.approx(collocated.cost, rel=1e-2)
+
+
+def test_a_discrete_problem_priced_by_absolute_values():
+    """From x = 1 with a price of 0.2 on abs(u) and 1 on abs(x): full steps as far as they pay."""
+    plain = Model(name="integrator", x=X, u=U, f=X + 0.25 * U, dt=1.0)
+    asked = OCP(
+        name="prices",
+        model=plain,
+        x0=[1.0],
+        horizon=6,
+        running_cost=ca.fabs(X) + 0.2 * ca.fabs(U),
+        control_bounds=Box(-1.0, 1.0),
+    )
+    found = solve(asked, MultipleShooting())
+    assert found.status.is_success, found.message
+    np.testing.assert_allclose(found.u.ravel(), [-1, -1, -1, -1, 0, 0], atol=1e-5)
+    assert found.cost == pytest.approx(1 + 0.75 + 0.5 + 0.25 + 0.8, rel=1e-6)
 
 
 def test_nothing_to_replace():

@@ -138,7 +138,9 @@ def _remedy(what: str, node: ca.SX, order: int) -> str:
     if what == "the running cost" and node.op() in _SLACK:
         return (
             "Solve ocp.without_kinks(problem), which has a slack control and inequalities in its "
-            "place and the same optimum. By hand, for abs(u) of a control u: controls p and m "
-            "with control_bounds Box(0, ...), p - m in place of u, p + m in place of abs(u)."
+            "place and the same optimum; Collocation does it by itself, and MultipleShooting where "
+            "only controls decide the kink. By hand, for abs(u) of a control u: "
+            "controls p and m with control_bounds Box(0, ...), p - m in place of u, p + m in place "
+            "of abs(u)."
         )
     return f"Write {smooth}, and reduce eps; smoothness=0 says that there is a kink."

@@ -1,0 +1,53 @@
+"""What is done to a problem before a method gets it: kinks replaced, everything in sizes."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+from ocp.checks.arguments import check_instance
+from ocp.method.epigraph_program import EpigraphProgram
+from ocp.method.method_solver import MethodSolver
+from ocp.method.scaled_program import ScaledProgram
+from ocp.problem.epigraph import Epigraph
+from ocp.problem.ocp import OCP
+from ocp.problem.scaled import scaled
+from ocp.solution.solver import Program
+
+
+@dataclass(frozen=True)
+class ScalingSolver(MethodSolver):
+    """A solver that iterates on numbers, and so measures a problem in sizes of its own.
+
+    Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.
+    """
+
+    def build(self, ocp: OCP) -> Program:
+        """Do all symbolic work; kinks in the cost are replaced first, where that is exact.
+
+        Raises:
+            UnsupportedProblem: naming the term that this method cannot treat.
+        """
+        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+        smooth = self.smooth_form(ocp)
+        if smooth is None:
+            return self._build_in_sizes(ocp)
+        written = self._build_in_sizes(ocp) if smooth.depends_on_data else None
+        program = self.unjudged()._build_in_sizes(smooth.problem)
+        return EpigraphProgram(self, smooth, program, written)
+
+    def smooth_form(self, ocp: OCP) -> Epigraph | None:
+        """Return the problem with slack controls where this method treats them exactly, or None.
+
+        Here None: a method that takes no path constraints solves the problem as it is written.
+        """
+        return None
+
+    def _build_in_sizes(self, ocp: OCP) -> Program:
+        """Do all symbolic work; a problem that is badly scaled is scaled first."""
+        in_sizes = scaled(ocp)
+        if in_sizes is None:
+            return self.prepare(ocp)
+        return ScaledProgram(in_sizes, self.prepare(in_sizes))
+
+    @abstractmethod
+    def prepare(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem in the units it is written in."""

@@ -1,0 +1,280 @@
+r"""Costs with absolute values, maxima and minima, written without their kinks.
+
+.. math::
+
+    \min \int \max(a, b) \, dt \quad \Leftrightarrow \quad
+    \min \int s \, dt \;\; \text{s.t.} \;\; s \ge a, \; s \ge b
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.checks.expressions import readable
+from ocp.problem.constraint import Box, Constraint
+from ocp.problem.guess import Guess
+from ocp.problem.ocp import OCP
+from ocp.problem.parameters import ParameterValues, Signal
+
+_MAXIMA = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
+# Instants at which the weight of a maximum is checked, and a guess is sampled.
+_INSTANTS = 21
+
+
+def without_kinks(ocp: OCP) -> OCP:
+    r"""Return the problem with slack controls in place of maxima in its running cost.
+
+    .. math::
+
+        \min \int \max(a, b) \, dt \quad \Leftrightarrow \quad
+        \min \int s \, dt \;\; \text{s.t.} \;\; s \ge a, \; s \ge b
+
+    and abs(a) = max(a, -a), min(a, b) = -max(-a, -b). The optimum is the same, and smooth where
+    a and b are: Newton's method converges on it. A maximum is replaced that enters the running
+    cost with a weight that is not negative (a minimum: not positive) and contains no state and no
+    control; others stay. The slack controls are appended to the controls of the model.
+
+    ``MultipleShooting``, ``BetweenNodes`` and ``Collocation`` do it by themselves where their grid
+    treats the slack controls exactly.
+
+    Args:
+        ocp: the problem; its terminal cost, dynamics and constraints stay as they are.
+
+    Raises:
+        UnsupportedProblem: naming the maximum whose weight is negative or varies, where none can
+            be replaced.
+        ProblemError: where there is no maximum.
+    """
+    everything = _Rewritten.of(ocp, frozenset())
+    if not everything.slacks:
+        raise ProblemError(f"{ocp.name}: its running cost has no absolute value or maximum")
+    found = epigraph(ocp)
+    if found is None or not found.holds(ocp.parameter_values()):
+        raise UnsupportedProblem(everything.refusal(ocp))
+    return found.problem
+
+
+def epigraph(ocp: OCP, *, held: bool = False) -> "Epigraph | None":
+    """Return the problem with slack controls, and the way back; None where nothing is replaced.
+
+    Args:
+        ocp: the problem.
+        held: replace only maxima of what does not change while the controls are held: a held
+            slack is then exact.
+    """
+    left: frozenset[int] = frozenset()
+    if not _has_maximum(ocp):
+        return None
+    while True:
+        rewritten = _Rewritten.of(ocp, left)
+        unfit = rewritten.unfit(ocp, held=held)
+        if not unfit:
+            break
+        left |= unfit
+    return Epigraph(ocp, rewritten) if rewritten.slacks else None
+
+
+@dataclass(frozen=True, eq=False)
+class Epigraph:
+    """A problem whose cost has kinks, and the same one without them.
+
+    Attributes:
+        original: the problem as it was written.
+        rewritten: its running cost with slacks.
+    """
+
+    original: OCP
+    rewritten: "_Rewritten"
+
+    @cached_property
+    def problem(self) -> OCP:
+        """The problem whose last controls are the slacks."""
+        ocp, m, s = self.original, self.original.model, self.rewritten.s
+        many, box = np.full(s.numel(), np.inf), ocp.control_bounds
+        above = tuple(
+            Constraint(f"slack {i}", expression, 0.0)
+            for i, expression in enumerate(self.rewritten.constraints)
+        )
+        units = (*m.u_units, *[""] * s.numel()) if m.u_units else ()
+        return replace(
+            ocp,
+            model=replace(m, u=ca.vertcat(m.u, s), u_units=units),
+            running_cost=self.rewritten.cost,
+            control_bounds=Box(np.append(box.lower, -many), np.append(box.upper, many)),
+            constraints=(*ocp.constraints, *above),
+            smoothness=ocp.smoothness if self.rewritten.left else 2,
+            guess=None if ocp.guess is None else self._extended(ocp.guess),
+        )
+
+    def _extended(self, guess: Guess) -> Guess:
+        """Return a guess with the slacks beside its controls."""
+        if guess.u is None:
+            return guess
+        fractions = np.linspace(0.0, 1.0, max(len(np.atleast_2d(guess.u)), _INSTANTS))
+        u = guess.sample("u", fractions, self.original.model.nu)
+        assert u is not None
+        x = guess.sample("x", fractions, self.original.model.nx)
+        return replace(guess, u=np.hstack([u, self.slacks(fractions, x, u)]))
+
+    def slacks(self, fractions: np.ndarray, x: np.ndarray | None, u: np.ndarray) -> np.ndarray:
+        """Return the slacks that touch their maxima, (len(fractions), n).
+
+        Args:
+            fractions: of the horizon, (k,).
+            x: states, (k, nx); None: the start.
+            u: controls, (k, nu).
+        """
+        ocp = self.original
+        x = np.tile(ocp.start(), (len(u), 1)) if x is None else x
+        p = ocp.parameter_values().at(fractions)
+        values = self._maxima.map(len(u))(x.T, u.T, fractions[None, :] * ocp.duration, p.T)
+        return np.array(values).T
+
+    @cached_property
+    def _maxima(self) -> ca.Function:
+        m = self.original.model
+        maxima = ca.vertcat(*self.rewritten.maxima)
+        return ca.Function("maxima", [m.x, m.u, m.t, self.original.p], [maxima])
+
+    @property
+    def depends_on_data(self) -> bool:
+        """Whether parameters or the time decide if it holds."""
+        return ca.depends_on(
+            self.rewritten.weights, ca.vertcat(self.original.model.t, self.original.p)
+        )
+
+    def holds(self, values: ParameterValues) -> bool:
+        """Whether no weight is negative with these parameters, so that each slack sinks."""
+        fractions = np.linspace(0.0, 1.0, _INSTANTS)
+        t, p = fractions[None, :] * self.original.duration, values.at(fractions).T
+        return bool((np.array(self._weights.map(_INSTANTS)(t, p)) >= 0.0).all())
+
+    @cached_property
+    def _weights(self) -> ca.Function:
+        inputs = [self.original.model.t, self.original.p]
+        return ca.Function("weights", inputs, [self.rewritten.weights])
+
+
+@dataclass(frozen=True, eq=False)
+class _Rewritten:
+    """A running cost in which maxima are symbols.
+
+    Attributes:
+        cost: the running cost.
+        slacks: the symbols s.
+        constraints: two for each slack, s - a and s - b, to be positive.
+        maxima: what each slack stands for, in terms of the original alone.
+        nodes: which instruction of the original cost each slack replaces.
+        left: the instructions that stay.
+    """
+
+    cost: ca.SX
+    slacks: list[ca.SX]
+    constraints: list[ca.SX]
+    maxima: list[ca.SX]
+    nodes: list[int]
+    left: frozenset[int]
+
+    @classmethod
+    def of(cls, ocp: OCP, left: frozenset[int]) -> "_Rewritten":
+        """Walk the operations of the running cost."""
+        m = ocp.model
+        symbols, varying = ca.vertcat(m.x, m.u, m.t, ocp.p), ca.vertcat(m.x, m.u)
+        function = ca.Function("cost", [symbols], [ca.SX(ocp.running_cost)])
+        found = cls(ca.SX(0), [], [], [], [], left)
+        # What every register holds: with slacks, and as it was written.
+        work = [(ca.SX(0), ca.SX(0))] * function.sz_w()
+        cost = ca.SX(0)
+        for k in range(function.n_instructions()):
+            operation = function.instruction_id(k)
+            at, to = function.instruction_input(k), function.instruction_output(k)
+            if operation == ca.OP_CONST:
+                constant = ca.SX(function.instruction_constant(k))
+                work[to[0]] = constant, constant
+            elif operation == ca.OP_INPUT:
+                work[to[0]] = symbols[at[1]], symbols[at[1]]
+            elif operation == ca.OP_OUTPUT:
+                cost = work[at[0]][0]
+            else:
+                values, written = ([work[i][side] for i in at] for side in (0, 1))
+                plain, original = _applied(operation, values), _applied(operation, written)
+                moves = ca.depends_on(ca.vertcat(*written), varying)
+                if operation in _MAXIMA and moves and k not in left:
+                    plain = found._replace(operation, values, original, k)
+                work[to[0]] = plain, original
+        return replace(found, cost=cost)
+
+    def _replace(self, operation: int, values: list[ca.SX], original: ca.SX, k: int) -> ca.SX:
+        """Return a maximum as a new slack, a minimum as one with the other sign."""
+        s, sign = ca.SX.sym(f"s_{len(self.slacks)}"), -1.0 if operation == ca.OP_FMIN else 1.0
+        second = -values[0] if operation == ca.OP_FABS else values[1]
+        self.constraints.extend(s - sign * value for value in (values[0], second))
+        self.slacks.append(s)
+        self.maxima.append(sign * original)
+        self.nodes.append(k)
+        return sign * s
+
+    @property
+    def s(self) -> ca.SX:
+        """The slacks, stacked (n,)."""
+        return ca.vertcat(ca.SX(0, 1), *self.slacks)
+
+    @property
+    def weights(self) -> ca.SX:
+        """By how much cost and maxima grow with each slack, (1 + 2 n, n)."""
+        rows = ca.vertcat(self.cost, *[-c for c in self.constraints])
+        # A slack has the slope -1 in its own two rows, minus the constraints.
+        own = ca.kron(ca.DM.eye(len(self.slacks)), ca.DM.ones(2, 1))
+        return ca.densify(ca.jacobian(rows, self.s)) + ca.vertcat(ca.DM(1, len(self.slacks)), own)
+
+    def unfit(self, ocp: OCP, *, held: bool) -> frozenset[int]:
+        """Return which maxima a slack does not replace, as instructions."""
+        m, weights, changing = ocp.model, self.weights, _changing(ocp)
+        unfit = set[int]()
+        for j, node in enumerate(self.nodes):
+            weight = weights[:, j]
+            varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, self.s))
+            if not varies and not ca.depends_on(weight, ca.vertcat(m.t, ocp.p)):
+                varies = not (np.array(ca.evalf(weight)) >= 0.0).all()
+            if varies or (held and ca.depends_on(self.maxima[j], changing)):
+                unfit.add(node)
+        return frozenset(unfit)
+
+    def refusal(self, ocp: OCP) -> str:
+        """Return why no maximum can be replaced."""
+        m, said = ocp.model, ", ".join(readable(each) for each in self.maxima)
+        if ca.depends_on(self.weights, ca.vertcat(m.x, m.u, self.s)):
+            return (
+                f"{ocp.name}: the weight of {said} in the running cost contains a state or a "
+                "control, so slack controls do not replace it"
+            )
+        return (
+            f"{ocp.name}: {said} enters the running cost with a negative weight, so its minimum is "
+            "not convex and slack controls do not replace it"
+        )
+
+
+def _has_maximum(ocp: OCP) -> bool:
+    """Look before the walk, which takes its time on an arm."""
+    cost = ca.SX(ocp.running_cost)
+    function = ca.Function("cost", [ca.vertcat(*ca.symvar(cost))], [cost])
+    return any(function.instruction_id(k) in _MAXIMA for k in range(function.n_instructions()))
+
+
+def _changing(ocp: OCP) -> ca.SX:
+    """Return the symbols that change while the controls are held."""
+    m = ocp.model
+    if m.is_discrete:
+        return ca.SX(0, 1)
+    signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
+    return ca.vertcat(m.x, m.t, *signals)
+
+
+def _applied(operation: int, values: list[ca.SX]) -> ca.SX:
+    """Return an operation of one or two arguments."""
+    if len(values) == 1:
+        return ca.SX.unary(operation, values[0])
+    return ca.SX.binary(operation, *values)
