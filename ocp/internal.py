@@ -29,6 +29,7 @@ from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.epigraph import Epigraph, epigraph
+from ocp.problem.node_fractions import node_fractions
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
@@ -83,6 +84,7 @@ __all__ = [
     "judged",
     "jumps_along",
     "most_violated",
+    "node_fractions",
     "scaled",
     "segment_gaps",
     "sizes_of",

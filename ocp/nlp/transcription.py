@@ -13,6 +13,7 @@ from ocp.integration.one_step import Integrator, Stage
 from ocp.nlp.start_slope import start_slope, step_with_fixed_start
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
+from ocp.problem.node_fractions import node_fractions
 from ocp.problem.nominal_sizes import time_unit
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
@@ -69,7 +70,11 @@ class Transcription:
     @property
     def fractions(self) -> np.ndarray:
         """Nodes as fractions of the horizon, (N + 1,)."""
-        return np.linspace(0.0, 1.0, self.n + 1)
+        return self._fractions
+
+    @cached_property
+    def _fractions(self) -> np.ndarray:
+        return node_fractions(self.ocp, self.n)
 
     def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
@@ -148,8 +153,8 @@ class Transcription:
         duration = ca.DM(np.full((1, n), ocp.duration))
         if ocp.has_free_time:
             duration = self.time_unit * z[nx, :-1]
-        h = duration / n
-        t = t0 + h * ca.DM(np.arange(n)).T
+        h = duration * ca.DM(np.diff(self.fractions)).T
+        t = t0 + duration * ca.DM(self.fractions[:-1]).T
         t_final = t0 + (self.time_unit * z[nx, -1] if ocp.has_free_time else ocp.duration)
         stages, nodes = [x[:, :-1], u, t, h, p_left, p_right], [x[:, :-1], u, t, p_left]
         if self.start_as_data:
@@ -266,7 +271,7 @@ class Transcription:
     def _start_slope(self, w: np.ndarray, lam_g: np.ndarray, data: RunData) -> np.ndarray:
         """Derivative of the Lagrangian in x_0, (nx,)."""
         left, right = data.values.on(self.fractions)
-        u, h = self.split(w)[1][0], self.duration(w) / self.n
+        u, h = self.split(w)[1][0], self.duration(w) * self.fractions[1]
         of_after = -lam_g[self._at("dynamics")][: self.ocp.model.nx]
         of_path = lam_g[self._at("path")][: len(self.ocp.rows.path.rows)]
         value = self._start_slope_function(

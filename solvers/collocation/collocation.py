@@ -49,12 +49,12 @@ class Collocation(ScalingSolver):
     A given start that violates a path constraint is ``INFEASIBLE``; a free one meets the state
     bounds and the path constraints without control. Control bounds hold everywhere: the control
     is at each instant a convex combination of coefficients within them. Signals are read at the
-    points; put mesh edges where they have kinks or jumps.
+    points; their knots are mesh edges where there are intervals enough.
 
     Source: [Hager 2000; Benson et al. 2006; Garg et al. 2010]; backend [Waechter & Biegler 2006].
 
     Args:
-        intervals: number of equal intervals.
+        intervals: number of intervals, equal but for the knots of signals.
         degree: points an interval, d, 2 to 5.
         points: ``"radau"``: the end of each interval is a point, damps what is stiff; or
             ``"gauss"``: one order more, symmetric in time.
@@ -90,10 +90,9 @@ class Collocation(ScalingSolver):
         check_positive(self.accuracy, "collocation: accuracy", finite=False)
         self.nlp_backend.check()
 
-    @property
-    def chosen_mesh(self) -> Mesh:
-        """The mesh, given or uniform."""
-        return self.mesh or Mesh.uniform(self.intervals, self.degree)
+    def mesh_of(self, ocp: OCP) -> Mesh:
+        """Return the mesh for a problem, given or as equal as the knots of its signals allow."""
+        return self.mesh or Mesh.of(ocp, self.intervals, self.degree)
 
     @property
     def nlp_backend(self) -> NlpBackend:
@@ -130,7 +129,7 @@ class Collocation(ScalingSolver):
             raise UnsupportedProblem(
                 f"{ocp.name}: collocation takes no discrete-time model ('{ocp.model.name}')"
             )
-        grid = CollocationGrid.of(self.chosen_mesh, self.points)
+        grid = CollocationGrid.of(self.mesh_of(ocp), self.points)
         transcription = CollocatedProblem(ocp, grid)
         nlp = self.nlp_backend.build(transcription)
         return CollocationProgram(self, ocp, transcription, Defects.of(ocp, grid), nlp)

@@ -120,7 +120,7 @@ def refine_mesh(
             in_own_units(start, own), solver=solver, accuracy=accuracy, rounds=rounds
         )
         return replace(found, solution=in_original_units(found.solution, own))
-    cells = _Cells.of(solver.chosen_mesh)
+    cells = _Cells.of(solver.mesh_of(start.problem))
     solution, done, made, work, iterations = start, [], 0.0, Work(), 0
     solve_time = 0.0
     for _ in range(rounds):

@@ -38,7 +38,8 @@ class MultipleShooting(ScalingSolver):
     Source: [Bock & Plitt 1984]; backends [Waechter & Biegler 2006], [Vanroye et al. 2023].
 
     Args:
-        intervals: number of intervals, with one held control each; a discrete-time problem
+        intervals: number of intervals, with one held control each, equal but for the knots of
+            signals, which are nodes where there are intervals enough; a discrete-time problem
             brings its own number.
         integrator: one-step method in each interval.
         backend: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.

@@ -6,13 +6,20 @@ from functools import cached_property
 import numpy as np
 
 from ocp import OCP, InitialGuess, Integrator
-from ocp.internal import BufferedFunction, RunData, Stage, compiled, sizes_of
+from ocp.internal import (
+    BufferedFunction,
+    RunData,
+    Stage,
+    compiled,
+    node_fractions,
+    sizes_of,
+)
 from solvers.direct.first_trajectory import FirstStates, first_states
 
 
 @dataclass(frozen=True, eq=False)
 class ShootingGrid:
-    """A problem on N equal intervals with one held control each.
+    """A problem on N intervals with one held control each, see ``node_fractions``.
 
     Attributes:
         ocp: the problem.
@@ -37,7 +44,7 @@ class ShootingGrid:
     @cached_property
     def fractions(self) -> np.ndarray:
         """Nodes as fractions of the horizon, (N + 1,)."""
-        return np.linspace(0.0, 1.0, self.n + 1)
+        return node_fractions(self.ocp, self.n)
 
     @cached_property
     def _sizes(self) -> np.ndarray:
@@ -48,7 +55,7 @@ class ShootingGrid:
         nodes = self.fractions
         left, right = data.values.on(nodes)
         t = data.t0 + nodes[None, :-1] * duration
-        return [t, np.full((1, self.n), duration / self.n), left.T, right.T]
+        return [t, duration * np.diff(nodes)[None, :], left.T, right.T]
 
     def first_iterate(
         self,

@@ -6,7 +6,15 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Integrator, UnsupportedProblem
-from ocp.internal import BufferedFunction, RunData, Stage, compiled, hamiltonian, time_unit
+from ocp.internal import (
+    BufferedFunction,
+    RunData,
+    Stage,
+    compiled,
+    hamiltonian,
+    node_fractions,
+    time_unit,
+)
 from solvers.gradient.line_search import LineSearchTrial
 
 
@@ -79,8 +87,8 @@ class Objective:
         sweeps: the integrations.
         data: of the run.
         nodes: as fractions of the horizon, (N + 1,).
-        h: length of an interval [s]; 1 in discrete time.
-        weight: of a control in the inner product: h in the problem's unit of time.
+        h: lengths of the intervals [s], (N,); 1 in discrete time.
+        weight: of the controls in the inner product, (N, 1): h in the problem's unit of time.
         rollouts: integrations forwards so far.
         backward: integrations backwards so far.
     """
@@ -89,12 +97,12 @@ class Objective:
         """Lay out the intervals."""
         ocp, n = sweeps.ocp, sweeps.n
         self.sweeps, self.data, self.box = sweeps, data, ocp.control_bounds
-        self.nodes = np.linspace(0.0, 1.0, n + 1)
-        self.h = 1.0 if ocp.model.is_discrete else ocp.duration / n
-        self.weight = self.h / time_unit(ocp)
+        self.nodes = node_fractions(ocp, n)
+        self.h = np.ones(n) if ocp.model.is_discrete else ocp.duration * np.diff(self.nodes)
+        self.weight = self.h[:, None] / time_unit(ocp)
         left, right = data.values.on(self.nodes)
         t = data.t0 + self.nodes[None, :-1] * ocp.duration
-        self._schedule = [t, np.full((1, n), self.h), left.T, right.T]
+        self._schedule = [t, self.h[None, :], left.T, right.T]
         self._end = (data.t0 + ocp.duration, data.values.at(1.0)[0])
         self.rollouts = self.backward = 0
 
@@ -143,7 +151,7 @@ class Objective:
 
     def inner(self, a: np.ndarray, b: np.ndarray) -> float:
         """(a, b), the integral of a'b over the horizon: Algorithm 2's inner product."""
-        return self.weight * float(np.vdot(a, b))
+        return float(np.vdot(self.weight * a, b))
 
 
 def _costate_step(ocp: OCP, integrator: Integrator) -> ca.Function:

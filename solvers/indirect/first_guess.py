@@ -19,7 +19,7 @@ def first_unknowns(
     Without states in the guess they are constant at the start, without costates those are zero.
     """
     shape, ocp = extremals.shape, extremals.ocp
-    nodes = np.linspace(0.0, 1.0, shape.segments + 1)
+    nodes = schedule.fractions[:: (len(schedule.fractions) - 1) // shape.segments]
     x = guess.sample("x", nodes, shape.nx) if guess else None
     costate = guess.sample("costate", nodes, shape.nx) if guess else None
     duration = (guess.duration if guess else None) or ocp.duration

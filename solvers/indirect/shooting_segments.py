@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp import OCP
-from ocp.internal import RunData
+from ocp.internal import RunData, node_fractions
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class ShootingSchedule:
     @classmethod
     def of(cls, ocp: OCP, data: RunData, steps: int, share: float = 1.0) -> "ShootingSchedule":
         """Return the schedule of the first ``share`` of the horizon."""
-        fractions = np.linspace(0.0, 1.0, steps + 1)
+        whole = share == 1.0
+        fractions = node_fractions(ocp, steps) if whole else np.linspace(0.0, 1.0, steps + 1)
         left, right = data.values.on(share * fractions)
         return cls(
             t0=data.t0,

@@ -1,0 +1,84 @@
+"""The nodes of a grid of N intervals, with the knots of signals among them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ocp.problem.ocp import OCP
+from ocp.problem.parameters import Signal
+
+# Nodes that differ by less are the same, in fractions of the horizon.
+_SAME = 1e-9
+# A signal bends where its second difference exceeds this share of its largest magnitude.
+_BENDS = 1e-9
+# A grid of so many intervals a space is halved; one with fewer is shared out anew.
+_HALVED = 4
+
+
+def node_fractions(ocp: OCP, intervals: int) -> np.ndarray:
+    """Return the nodes of N intervals as fractions of the horizon, (N + 1,).
+
+    They are equally spaced where the knots of all declared signals are among such nodes. Else
+    the intervals are shared out among the spaces between the knots, in proportion to their
+    lengths and at least one each, since the integration of an interval sees no jump inside it.
+    Where there are more knots than intervals, those at which the declared samples bend are
+    taken in, then those at which they jump, then none. In discrete time the steps are the nodes.
+
+    Args:
+        ocp: the problem.
+        intervals: N.
+    """
+    uniform = np.linspace(0.0, 1.0, intervals + 1)
+    if ocp.model.is_discrete:
+        return uniform
+    for knots in _candidates(ocp):
+        if (np.abs(knots[:, None] - uniform).min(axis=1, initial=1.0) <= _SAME).all():
+            return uniform
+        if len(knots) < intervals:
+            return _shared_out(np.array([0.0, *knots, 1.0]), intervals)
+    return uniform
+
+
+def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
+    """Yield inner knots: all, where the samples bend, where they jump; fewer and fewer."""
+    signals = [entry for entry in ocp.parameters if isinstance(entry, Signal)]
+    for which in (_all, _bending, _jumping):
+        found = np.sort(np.concatenate([np.zeros(0), *[which(signal) for signal in signals]]))
+        yield found[np.diff(found, prepend=0.0) > _SAME]
+
+
+def _all(signal: Signal) -> np.ndarray:
+    return signal.knots[1:-1]
+
+
+def _bending(signal: Signal) -> np.ndarray:
+    """Inner knots at which a held signal jumps, or the slope of a linear one does."""
+    samples = signal.value
+    change = np.diff(samples[:-1], axis=0)
+    if signal.hold == "linear":
+        change = np.diff(samples, n=2, axis=0)
+    moved = (np.abs(change) > _BENDS * np.abs(samples).max()).any(axis=1)
+    return signal.knots[1:-1][moved]
+
+
+def _jumping(signal: Signal) -> np.ndarray:
+    return _bending(signal) if signal.hold == "held" else np.zeros(0)
+
+
+def _shared_out(edges: np.ndarray, intervals: int) -> np.ndarray:
+    """Cut the spaces between edges into a number of intervals in all, as equal as possible.
+
+    Twice as many are the same ones halved, which those need who compare two grids.
+    """
+    lengths, coarse = np.diff(edges), intervals
+    while coarse % 2 == 0 and coarse // 2 >= _HALVED * len(lengths):
+        coarse //= 2
+    counts = np.ones(len(lengths), dtype=int)
+    for _ in range(coarse - len(lengths)):
+        counts[np.argmax(lengths / counts)] += 1
+    counts *= intervals // coarse
+    parts = [
+        np.linspace(left, right, count + 1)[:-1]
+        for left, right, count in zip(edges, edges[1:], counts, strict=False)
+    ]
+    return np.append(np.concatenate(parts), 1.0)
