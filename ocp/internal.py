@@ -29,12 +29,13 @@ from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
 from ocp.problem.epigraph import Epigraph, epigraph
-from ocp.problem.node_fractions import node_fractions
+from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
+from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
@@ -62,6 +63,7 @@ __all__ = [
     "Stage",
     "Transcription",
     "Violation",
+    "applied",
     "bernstein",
     "c_code",
     "check_callable",
@@ -85,6 +87,7 @@ __all__ = [
     "jumps_along",
     "most_violated",
     "node_fractions",
+    "node_widths",
     "scaled",
     "segment_gaps",
     "sizes_of",
@@ -93,4 +96,5 @@ __all__ = [
     "stationary",
     "symbol_type",
     "time_unit",
+    "walk",
 ]

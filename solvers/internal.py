@@ -2,7 +2,7 @@
 
 from solvers.certify.certificate import Check, Estimate, Verdict
 from solvers.diagnose.cause import Cause
-from solvers.diagnose.finding import Severity
+from solvers.diagnose.finding import Finding, Severity
 from solvers.indirect.reverse.invariant_manifold import InvariantManifold
 from solvers.indirect.reverse.scan import Scan
 from solvers.indirect.reverse.self_motion import SelfMotion, seeds_around, self_motions
@@ -14,6 +14,7 @@ __all__ = [
     "Cause",
     "Check",
     "Estimate",
+    "Finding",
     "InvariantManifold",
     "Inverse",
     "Level",

@@ -13,7 +13,7 @@ from ocp.integration.one_step import Integrator, Stage
 from ocp.nlp.start_slope import start_slope, step_with_fixed_start
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
-from ocp.problem.node_fractions import node_fractions
+from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import time_unit
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
@@ -153,7 +153,7 @@ class Transcription:
         duration = ca.DM(np.full((1, n), ocp.duration))
         if ocp.has_free_time:
             duration = self.time_unit * z[nx, :-1]
-        h = duration * ca.DM(np.diff(self.fractions)).T
+        h = duration * ca.DM(node_widths(self.fractions)).T
         t = t0 + duration * ca.DM(self.fractions[:-1]).T
         t_final = t0 + (self.time_unit * z[nx, -1] if ocp.has_free_time else ocp.duration)
         stages, nodes = [x[:, :-1], u, t, h, p_left, p_right], [x[:, :-1], u, t, p_left]
@@ -271,7 +271,7 @@ class Transcription:
     def _start_slope(self, w: np.ndarray, lam_g: np.ndarray, data: RunData) -> np.ndarray:
         """Derivative of the Lagrangian in x_0, (nx,)."""
         left, right = data.values.on(self.fractions)
-        u, h = self.split(w)[1][0], self.duration(w) * self.fractions[1]
+        u, h = self.split(w)[1][0], self.duration(w) * node_widths(self.fractions)[0]
         of_after = -lam_g[self._at("dynamics")][: self.ocp.model.nx]
         of_path = lam_g[self._at("path")][: len(self.ocp.rows.path.rows)]
         value = self._start_slope_function(

@@ -18,6 +18,7 @@ from ocp.problem.constraint import Box, Constraint
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues, Signal
+from ocp.problem.walk import applied, walk
 
 _MAXIMA = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
 # Instants at which the weight of a maximum is checked, and a guess is sampled.
@@ -183,28 +184,20 @@ class _Rewritten:
         """Walk the operations of the running cost."""
         m = ocp.model
         symbols, varying = ca.vertcat(m.x, m.u, m.t, ocp.p), ca.vertcat(m.x, m.u)
-        function = ca.Function("cost", [symbols], [ca.SX(ocp.running_cost)])
         found = cls(ca.SX(0), [], [], [], [], left)
-        # What every register holds: with slacks, and as it was written.
-        work = [(ca.SX(0), ca.SX(0))] * function.sz_w()
-        cost = ca.SX(0)
-        for k in range(function.n_instructions()):
-            operation = function.instruction_id(k)
-            at, to = function.instruction_input(k), function.instruction_output(k)
-            if operation == ca.OP_CONST:
-                constant = ca.SX(function.instruction_constant(k))
-                work[to[0]] = constant, constant
-            elif operation == ca.OP_INPUT:
-                work[to[0]] = symbols[at[1]], symbols[at[1]]
-            elif operation == ca.OP_OUTPUT:
-                cost = work[at[0]][0]
-            else:
-                values, written = ([work[i][side] for i in at] for side in (0, 1))
-                plain, original = _applied(operation, values), _applied(operation, written)
-                moves = ca.depends_on(ca.vertcat(*written), varying)
-                if operation in _MAXIMA and moves and k not in left:
-                    plain = found._replace(operation, values, original, k)
-                work[to[0]] = plain, original
+
+        def node(
+            k: int, operation: int, arguments: list[tuple[ca.SX, ca.SX]]
+        ) -> tuple[ca.SX, ca.SX]:
+            """With slacks, and as it was written."""
+            values, written = ([pair[side] for pair in arguments] for side in (0, 1))
+            original = applied(operation, written)
+            moves = ca.depends_on(ca.vertcat(*written), varying)
+            if operation in _MAXIMA and moves and k not in left:
+                return found._replace(operation, values, original, k), original
+            return applied(operation, values), original
+
+        cost, _ = walk(ca.SX(ocp.running_cost), symbols, lambda leaf: (leaf, leaf), node)
         return replace(found, cost=cost)
 
     def _replace(self, operation: int, values: list[ca.SX], original: ca.SX, k: int) -> ca.SX:
@@ -271,10 +264,3 @@ def _changing(ocp: OCP) -> ca.SX:
         return ca.SX(0, 1)
     signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
     return ca.vertcat(m.x, m.t, *signals)
-
-
-def _applied(operation: int, values: list[ca.SX]) -> ca.SX:
-    """Return an operation of one or two arguments."""
-    if len(values) == 1:
-        return ca.SX.unary(operation, values[0])
-    return ca.SX.binary(operation, *values)

@@ -39,6 +39,14 @@ def node_fractions(ocp: OCP, intervals: int) -> np.ndarray:
     return uniform
 
 
+def node_widths(nodes: np.ndarray) -> np.ndarray:
+    """Return the lengths of the intervals between nodes, (N,); equal ones without rounding."""
+    widths = np.diff(nodes)
+    if np.ptp(widths) <= _SAME * widths[0]:
+        return np.full(len(widths), 1.0 / len(widths))
+    return widths
+
+
 def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
     """Yield inner knots: all, where the samples bend, where they jump; fewer and fewer."""
     signals = [entry for entry in ocp.parameters if isinstance(entry, Signal)]

@@ -21,6 +21,7 @@ import numpy as np
 
 from ocp.problem.constraint import Constraint
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import Signal
 
 # How much each kind of knowledge counts: bounds, start and guess, dynamics, the rate at the start
 # (which fast dynamics keep up for much less than T), cost, rows.
@@ -31,7 +32,7 @@ _ROUNDING = 1e-9
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
 _OF_DISTANCE = 0.1
-# Where along the guess derivatives are taken.
+# Where along the guess derivatives are taken, beside the instants at which signals are largest.
 _FRACTIONS = np.array([0.0, 0.5, 1.0])
 
 
@@ -208,15 +209,27 @@ class _Functions:
 
 def _points(ocp: OCP) -> list[_Point]:
     """Return the start, and points along the guess."""
-    m, values = ocp.model, ocp.parameter_values()
+    m, fractions = ocp.model, np.append(_FRACTIONS, _peaks(ocp))
     u0 = ocp.control_bounds.clip(np.zeros(m.nu))
-    x, u = np.tile(ocp.start(), (3, 1)), np.tile(u0, (3, 1))
+    x, u = (np.tile(each, (len(fractions), 1)) for each in (ocp.start(), u0))
     if ocp.guess is not None:
-        guess_x = ocp.guess.sample("x", _FRACTIONS, m.nx)
-        guess_u = ocp.guess.sample("u", _FRACTIONS, m.nu)
+        guess_x = ocp.guess.sample("x", fractions, m.nx)
+        guess_u = ocp.guess.sample("u", fractions, m.nu)
         x, u = (x if guess_x is None else guess_x), (u if guess_u is None else guess_u)
-    times, p = ocp.duration * _FRACTIONS, values.at(_FRACTIONS)
-    return [_Point(*each) for each in zip(x, u, times, p, strict=True)]
+    p = ocp.parameter_values().at(fractions)
+    # A sine that is zero at an instant but for rounding says nothing of sizes there.
+    p[np.abs(p) <= _ROUNDING * np.abs(p).max(axis=0, initial=0.0)] = 0.0
+    return [_Point(*each) for each in zip(x, u, ocp.duration * fractions, p, strict=True)]
+
+
+def _peaks(ocp: OCP) -> np.ndarray:
+    """Return the fractions of the horizon at which the samples of signals are largest."""
+    found = []
+    for entry in ocp.parameters:
+        if isinstance(entry, Signal):
+            row = int(np.abs(entry.value).max(axis=1).argmax())
+            found.append(entry.knots[row])
+    return np.setdiff1d(found, _FRACTIONS)
 
 
 def _displaced(ocp: OCP, points: list[_Point], sizes: np.ndarray) -> list[_Point]:

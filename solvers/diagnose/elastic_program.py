@@ -101,7 +101,8 @@ class ElasticProgram:
     @cached_property
     def _nlp(self) -> ca.Function:
         s = ca.MX.sym("s", len(self.demands))
-        slack = s[[int(i) for i in self.owner]]
+        # Of a single demand, a list of indices would be a row.
+        slack = ca.vec(s[[int(i) for i in self.owner]])
         near = ca.MX.sym("near", self.w.numel())
         apart = (self.w - near) / (1.0 + ca.fabs(near))
         nlp = {

@@ -16,7 +16,7 @@ import numpy as np
 from ocp import Status
 from ocp.internal import RunData, start_violation
 from solvers.direct.curvature_check import has_negative_curvature
-from solvers.direct.feasibility_restoration import FeasibilityRestoration
+from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
 from solvers.direct.nlp_backends import Nlp, NlpResult
 from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
@@ -137,7 +137,7 @@ class NlpRun:
 
     def restore_feasibility(self, inputs: NlpInputs, failed: NlpOutcome) -> NlpOutcome:
         """Find the least violating trajectory; from a feasible one, run the backend again."""
-        least = self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+        least = self._least_violating(inputs)
         if least is None:
             return failed
         found = replace(failed, results=(*failed.results, least.result))
@@ -145,6 +145,26 @@ class NlpRun:
             return self._run_to_an_optimum(replace(inputs, w0=least.result.w)).after(found)
         message = self._verdict.where(least.result, inputs.data, least.violation, least.row)
         return replace(found, status=Status.INFEASIBLE, message=message)
+
+    def _least_violating(self, inputs: NlpInputs) -> LeastViolation | None:
+        """Find the least violation, again from perturbed controls where some did not move.
+
+        What stands still by symmetry, as at the kink of an absolute value, may hide a way out.
+        """
+        least = self._restoration.least_violating(inputs.w0, inputs.bounds, inputs.p)
+        if least is None or least.violation <= _FEASIBLE or not self.transcription.ocp.model.nu:
+            return least
+        hidden = self._hidden(inputs, least.result.w)
+        if not hidden.any():
+            return least
+        w0 = perturbed(self.transcription, inputs, least.result.w, hidden)
+        other = self._restoration.least_violating(w0, inputs.bounds, inputs.p)
+        return other if other and other.violation < least.violation else least
+
+    def _hidden(self, inputs: NlpInputs, w: np.ndarray) -> np.ndarray:
+        """Return which controls did not move, though no bound kept them, bool (nu,)."""
+        still = unmoved(self.transcription, inputs, w)
+        return still & ~at_bounds(self.transcription, inputs, w)
 
     def solve_from_others(
         self, first: NlpInputs, failed: NlpOutcome, others: Sequence[OtherStart], started: float
@@ -190,7 +210,7 @@ class NlpRun:
         still = unmoved(problem, inputs, first.last.w)
         if still.all():
             return self.solve_from_perturbed(inputs, first, chosen)
-        hidden = still & ~at_bounds(problem, inputs, first.last.w)
+        hidden = self._hidden(inputs, first.last.w)
         if not hidden.any():
             return first
         return self.solve_from_some_perturbed(inputs, first, chosen, hidden)

@@ -12,6 +12,7 @@ from ocp.internal import (
     Stage,
     compiled,
     node_fractions,
+    node_widths,
     sizes_of,
 )
 from solvers.direct.first_trajectory import FirstStates, first_states
@@ -55,7 +56,7 @@ class ShootingGrid:
         nodes = self.fractions
         left, right = data.values.on(nodes)
         t = data.t0 + nodes[None, :-1] * duration
-        return [t, duration * np.diff(nodes)[None, :], left.T, right.T]
+        return [t, duration * node_widths(nodes)[None, :], left.T, right.T]
 
     def first_iterate(
         self,

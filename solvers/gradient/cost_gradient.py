@@ -13,6 +13,7 @@ from ocp.internal import (
     compiled,
     hamiltonian,
     node_fractions,
+    node_widths,
     time_unit,
 )
 from solvers.gradient.line_search import LineSearchTrial
@@ -98,7 +99,7 @@ class Objective:
         ocp, n = sweeps.ocp, sweeps.n
         self.sweeps, self.data, self.box = sweeps, data, ocp.control_bounds
         self.nodes = node_fractions(ocp, n)
-        self.h = np.ones(n) if ocp.model.is_discrete else ocp.duration * np.diff(self.nodes)
+        self.h = np.ones(n) if ocp.model.is_discrete else ocp.duration * node_widths(self.nodes)
         self.weight = self.h[:, None] / time_unit(ocp)
         left, right = data.values.on(self.nodes)
         t = data.t0 + self.nodes[None, :-1] * ocp.duration

@@ -109,9 +109,9 @@ def test_an_exact_trajectory_is_feasible_and_costs_what_it_costs(horizon, t0: fl
     tr, data, u = Transcription(ocp, n, RK4(2)), data_of(ocp, t0), rng.normal(size=(n, 2))
     step = Stage.of(ocp, RK4(2), held=True).step
     left, right = data.values.on(tr.fractions)
-    h, x, cost = ocp.duration / n, [ocp.start()], 0.0
+    t, x, cost = t0 + ocp.duration * tr.fractions, [ocp.start()], 0.0
     for k in range(n):
-        after, c = step(x[k], u[k], t0 + k * h, h, left[k], right[k])
+        after, c = step(x[k], u[k], t[k], t[k + 1] - t[k], left[k], right[k])
         x.append(np.array(after).ravel())
         cost += float(c)
     z = np.array(x)

@@ -40,6 +40,10 @@ def grid(subject: DiagnosedProblem) -> Iterator[Finding]:
         return
     hopeless = fastest * h > _HOPELESS
     names = _fast(m.x_names, slopes[finite][k], fastest)
+    if (given := subject.given) and given.control_kind == "polynomial":
+        if not given.status.is_success:
+            yield _on_a_mesh(names, fastest)
+        return
     needed = int(np.ceil(fastest * ocp.duration / _STABLE))
     yield Finding(
         Cause.COARSE_GRID,
@@ -51,6 +55,20 @@ def grid(subject: DiagnosedProblem) -> Iterator[Finding]:
         "is implicit, or replace what is so fast by its stationary value.",
         fastest * h,
         instant=float(subject.along.t[np.flatnonzero(finite)[k]]),
+    )
+
+
+def _on_a_mesh(names: tuple[str, ...], fastest: float) -> Finding:
+    """What to say of a collocated solution, whose method is implicit already."""
+    return Finding(
+        Cause.COARSE_GRID,
+        Severity.WARNING,
+        names,
+        f"The fastest motion, in {', '.join(names)}, has a time constant of {1 / fastest:.2g} s, "
+        "and the mesh does not resolve it everywhere: refine_mesh(solution) puts the intervals "
+        "where they are needed.",
+        1 / fastest,
+        "s",
     )
 
 
