@@ -27,7 +27,7 @@ from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
-from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, Violation
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows, Violation
 from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
@@ -54,6 +54,7 @@ __all__ = [
     "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
+    "ProblemRows",
     "RunData",
     "RunResult",
     "ScaledOCP",

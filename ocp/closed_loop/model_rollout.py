@@ -12,7 +12,7 @@ from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.compile import compiled
 from ocp.integration.one_step import RK4, Stage
 from ocp.problem.cache import once_per_problem
-from ocp.problem.constraint_rows import Violation
+from ocp.problem.constraint_rows import ProblemRows, Violation
 from ocp.problem.ocp import OCP
 
 # Parameters at the left and at the right end of each interval, (N, n_p) each.
@@ -50,12 +50,14 @@ class ModelRollout:
         n: number of intervals.
         compiled: whether the model runs as machine code.
         control_at_end: whether the last control still acts at the last node.
+        rows: what is checked; default: all rows of the problem.
     """
 
     ocp: OCP
     n: int
     compiled: bool = False
     control_at_end: bool = False
+    rows: ProblemRows | None = None
 
     def of(
         self, x0: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
@@ -76,12 +78,12 @@ class ModelRollout:
         self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
     ) -> tuple[float, str]:
         """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
-        rows, found = self.ocp.rows, [Violation()]
+        rows, found = self._rows, [Violation()]
         if rows.states.is_imposed:
             found.append(rows.states.largest_violation(x[1:], t[1:]))
         if rows.controls.is_imposed:
             found.append(rows.controls.largest_violation(u, t))
-        if rows.path:
+        if rows.path.is_imposed:
             nodes = np.vstack([p[0], p[1][-1:]])
             values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
             found.append(rows.path.largest_violation(values, t, exempt=self._exempt))
@@ -89,11 +91,15 @@ class ModelRollout:
 
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
         """Return the largest violation of a terminal constraint by a final state (nx,)."""
-        terminal = self.ocp.rows.terminal
+        terminal = self._rows.terminal
         if not terminal:
             return 0.0, ""
         values = np.array(self.ocp.functions.terminal(x, t, p)).T
         return _in_words(terminal.largest_violation(values, np.array([t])))
+
+    @property
+    def _rows(self) -> ProblemRows:
+        return self.rows or self.ocp.rows
 
     @cached_property
     def _rollout(self) -> BufferedFunction:

@@ -53,7 +53,8 @@ def with_input_rate(
     constraints = [replace(c, expression=moved(c.expression)) for c in ocp.constraints]
     if ocp.control_bounds.is_active:
         box = ocp.control_bounds
-        constraints.append(Constraint("control_bounds", now, box.lower, box.upper))
+        bounds = Constraint("control_bounds", now, box.lower, box.upper, limits_input=True)
+        constraints.append(bounds)
     free = np.full(m.nu, np.inf)
     state = ocp.state_bounds
     return replace(
@@ -82,4 +83,5 @@ def _model(m: Model, before: ca.SX, change: ca.SX) -> Model:
         dt=m.dt,
         x_units=(*m.x_units, *units) if m.x_units else (),
         u_units=m.u_units,
+        u_is_change=True,
     )

@@ -130,7 +130,7 @@ class LinearQuadratic:
         rows: name of each row at nodes 0..N-1.
         end_rows: name of each row at node N.
         on_control: whether a row has a control in it, (rows,).
-        is_control_bound: whether a row is a bound of one control, (rows,).
+        limits_input: whether a row limits what is sent, as a bound of a control does, (rows,).
         stage_matrices: (t, parameters) -> A, B, Q, S, R, D_x, D_u.
         stage_vectors: (t, parameters) -> (c, q, r, constant, offset of the rows), one column.
         end_matrices: (t, parameters) -> P, D_f.
@@ -143,7 +143,7 @@ class LinearQuadratic:
     rows: tuple[str, ...]
     end_rows: tuple[str, ...]
     on_control: np.ndarray
-    is_control_bound: np.ndarray
+    limits_input: np.ndarray
     stage_matrices: ca.Function
     stage_vectors: ca.Function
     end_matrices: ca.Function

@@ -136,7 +136,7 @@ def _assemble(ocp: OCP, terms: Terms) -> LinearQuadratic:
         rows=tuple(r.name for r in rows),
         end_rows=tuple(r.name for r in end),
         on_control=np.array(on_control + [True] * len(bounds), dtype=bool),
-        is_control_bound=np.array([False] * len(path) + [True] * len(bounds), dtype=bool),
+        limits_input=np.array(_limits_input(ocp, len(path)) + [True] * len(bounds), dtype=bool),
         stage_matrices=ca.Function("stage_matrices", inputs, [ca.densify(b) for b in blocks]),
         stage_vectors=ca.Function("stage_vectors", inputs, [ca.densify(vectors)]),
         end_matrices=ca.Function("end_matrices", inputs, [hessian / 2, ca.densify(d_f)]),
@@ -144,6 +144,12 @@ def _assemble(ocp: OCP, terms: Terms) -> LinearQuadratic:
         row_box=_box(rows),
         end_box=_box(end),
     )
+
+
+def _limits_input(ocp: OCP, count: int) -> list[bool]:
+    """Return which of the path's rows limit what is sent; bounds of states, behind them, do not."""
+    own = [row.kind == "input" for row in ocp.rows.path.rows]
+    return own + [False] * (count - len(own))
 
 
 def _path_rows(constraints: tuple[Constraint, ...]) -> list[Constraint]:

@@ -121,13 +121,43 @@ def suggest_backup(ocp: OCP, dt: float, applied: PlantInput) -> Backup:
 
 
 def _regulator(ocp: OCP, dt: float) -> ParametricLaw:
-    return saturated_lqr(ocp, dt=None if ocp.model.is_discrete else dt)
+    law = saturated_lqr(ocp, dt=None if ocp.model.is_discrete else dt)
+    _refuse_blind(ocp)
+    return law
 
 
 def _kinematics(ocp: OCP, dt: float) -> ParametricLaw:
     if not is_redundant(ocp):
         raise UnsupportedProblem(f"{ocp.name}: the control does not move what a task leaves free")
+    _refuse_blind(ocp)
     return instantaneous(ocp)
+
+
+def _refuse_blind(ocp: OCP) -> None:
+    """Refuse a law that follows the running cost where that does not see what is limited.
+
+    A cost sees the states in it, and those that move what it sees. A price of the heating alone
+    sees no temperature: the law that minimises it lets the room freeze.
+    """
+    m = ocp.model
+    moved = np.array(ca.DM(ca.jacobian_sparsity(m.f, m.x), 1.0)) > 0.0
+    seen = _contained(ca.SX(ocp.running_cost), m.x)
+    for _ in range(m.nx):
+        seen = seen | moved[seen].any(axis=0)
+    box = ocp.state_bounds
+    limited = np.isfinite(np.asarray(box.lower)) | np.isfinite(np.asarray(box.upper))
+    for c in ocp.constraints:
+        limited = limited | _contained(c.expression, m.x)
+    blind = limited & ~seen
+    if blind.any() or not seen.any():
+        names = ", ".join(n for n, on in zip(m.x_names, blind, strict=True) if on) or "state"
+        raise UnsupportedProblem(f"{ocp.name}: the running cost sees no {names}")
+
+
+def _contained(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
+    """Return which symbols an expression contains, bool (n,)."""
+    structure = np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1.0))
+    return np.asarray(structure.any(axis=0))
 
 
 _SUGGESTIONS: tuple[tuple[str, Callable[[OCP, float], ParametricLaw]], ...] = (

@@ -16,8 +16,10 @@ from ocp.closed_loop.decision import Decision, InputSource, StepReport
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.mpc.backup_selection import Backup
 from ocp.mpc.controller_state import ControllerState
+from ocp.mpc.input_limits import InputLimits, Instant
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import InputMap, PlantInput
+from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
 from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
 from ocp.solution.solution import Solution
@@ -76,12 +78,14 @@ class FallbackLadder:
     Attributes:
         program: the built solver.
         duration: of the horizon [s].
+        rows: what a plan must meet: the rows that the solver was given.
         See ``MPC`` for all others.
     """
 
     ocp: OCP
     program: Program
     duration: float
+    rows: ProblemRows
     dt: float
     applied: PlantInput
     backup: Backup
@@ -248,11 +252,13 @@ class FallbackLadder:
         self, last: np.ndarray | None, start: np.ndarray, t: float, p: HorizonParameters
     ) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
-        size = self.applied.size(self.ocp)
-        given, reason = self.backup.input(start, t, p.at(t), size=size, last=last)
+        size, now = self.applied.size(self.ocp), Instant(start, t, p.at(t))
+        if self.ocp.model.u_is_change:  # to hold is to change nothing
+            last = np.zeros(size)
+        given, reason = self.backup.input(*now, size=size, last=last)
         if given is None:
             return None, reason
-        selected, problem = self._bounded(given, InputSource.BACKUP)
+        selected, problem = self._bounded(given, InputSource.BACKUP, now)
         return selected, _joined(reason, problem)
 
     def _follow(
@@ -262,18 +268,14 @@ class FallbackLadder:
         # A control that moves is held at its value in the middle of the interval, its mean but
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
-        u = plan_controls(plan, t + middle)
-        return self._bounded(self._input_map(x, u, t, p.at(t)), source, plan)
+        u, now = plan_controls(plan, t + middle), Instant(x, t, p.at(t))
+        return self._bounded(self._input_map(x, u, t, now.p), source, now, plan)
 
     def _bounded(
-        self, given: np.ndarray, source: InputSource, plan: Solution | None = None
+        self, given: np.ndarray, source: InputSource, now: Instant, plan: Solution | None = None
     ) -> Rung:
-        """Clip an input; None if it is not finite, or a plan's that is clipped by too much."""
-        # Nearly all inputs need no clipping, and plain numbers say so sooner than numpy does.
-        each = zip(given.tolist(), *self._limits, strict=True)
-        if all([low <= value <= high for value, low, high in each]):
-            return SelectedInput(source, given.copy(), 0.0, plan), ""
-        inside = self.applied.box(self.ocp).clip(given)
+        """Move an input into its limits; None if it is not finite, or a plan's and moved far."""
+        inside = self._input_limits.nearest(given, now)
         excess = float(np.abs(given - inside).max())  # not finite where the input is not
         if not isfinite(excess):
             return None, f"the input {given} is not finite"
@@ -283,15 +285,15 @@ class FallbackLadder:
 
     @cached_property
     def _check(self) -> PlanCheck:
-        return PlanCheck(self.ocp, self.dt, self.compiled)
+        return PlanCheck(self.ocp, self.dt, self.compiled, self.rows)
 
     @cached_property
     def _input_map(self) -> InputMap:
         return self.applied.sending(self.ocp)
 
     @cached_property
-    def _limits(self) -> tuple[list[float], list[float]]:
-        return self.applied.limits(self.ocp)
+    def _input_limits(self) -> InputLimits:
+        return InputLimits(self.ocp, self.applied)
 
 
 def _joined(said: str, more: str) -> str:

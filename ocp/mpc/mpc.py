@@ -119,6 +119,7 @@ class MPC:
             ocp=self.ocp,
             program=solver.build(self.ocp),
             duration=self.ocp.duration,
+            rows=solver.imposed(self.ocp),
             dt=self.dt,
             applied=self.applied,
             backup=self.backup_law,

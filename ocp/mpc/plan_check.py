@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp.closed_loop.model_rollout import IntervalParameters, ModelRollout
+from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
 from ocp.solution.shifted_plan import plan_controls
@@ -67,11 +68,13 @@ class PlanCheck:
         ocp: the problem.
         dt: sampling interval [s].
         compiled: whether the model runs as machine code.
+        rows: what a plan must meet: the rows that its solver was given.
     """
 
     ocp: OCP
     dt: float
     compiled: bool
+    rows: ProblemRows
     # By the number of intervals: a roll-out is prepared once for each.
     _rollouts: dict[int, ModelRollout] = field(default_factory=dict)
 
@@ -118,11 +121,10 @@ class PlanCheck:
 
     def _rollout(self, n: int) -> ModelRollout:
         if n not in self._rollouts:
-            self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled)
+            self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled, rows=self.rows)
         return self._rollouts[n]
 
     @cached_property
     def _is_constrained(self) -> bool:
         """Whether there is anything along the way that a plan could violate."""
-        ocp = self.ocp
-        return bool(ocp.at("path")) or ocp.state_bounds.is_active or ocp.control_bounds.is_active
+        return any(r.is_imposed for r in (self.rows.path, self.rows.states, self.rows.controls))

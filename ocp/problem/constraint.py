@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_instance, check_nominal, check_numbers
+from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_numbers
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_column
 
@@ -83,6 +83,9 @@ class Constraint:
             manifold, and ``x0`` a guess) or ``"terminal"``.
         nominal: a typical size of the rows, a number or (m,), to measure a violation by; None: it
             is estimated, see ``Solution.sizes``.
+        limits_input: whether the rows limit what an actuator is sent, so that whatever acts has to
+            meet them and no penalty makes them soft; None: where they contain controls and no
+            states. With a state that holds the actuator's position, say so.
 
     Raises:
         ProblemError: naming the constraint and what is wrong with place, expression or bounds.
@@ -94,6 +97,7 @@ class Constraint:
     upper: ArrayLike = np.inf
     at: Place = "path"
     nominal: ArrayLike | None = None
+    limits_input: bool | None = None
 
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
@@ -112,6 +116,12 @@ class Constraint:
         object.__setattr__(self, "upper", box.upper)
         nominal = check_nominal(self.nominal, self.size, f"constraint '{self.name}': nominal")
         object.__setattr__(self, "nominal", nominal)
+        if self.limits_input is not None:
+            check_flag(self.limits_input, f"constraint '{self.name}': limits_input")
+        if self.limits_input and self.at != "path":
+            raise ProblemError(
+                f"constraint '{self.name}' limits an input: it has to hold at='path'"
+            )
 
     @property
     def size(self) -> int:

@@ -1,7 +1,7 @@
 """The rows that a problem imposes: what each one is, where it holds, by how much it is violated."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -11,9 +11,10 @@ import numpy as np
 from ocp.problem.constraint import Box, Constraint, Place
 from ocp.problem.model import Model
 
-#: An ``"input"`` row limits controls whatever the state is: it can always be met, by whatever acts.
-#: Any other row is ``"hard"``: to meet it may take time, or be impossible.
-RowKind = Literal["hard", "input"]
+#: An ``"input"`` row limits what is sent: it can always be met, by whatever acts. A ``"soft"`` row
+#: may be exceeded at a price that its solver knows. Any other row is ``"hard"``: to meet it may
+#: take time, or be impossible.
+RowKind = Literal["hard", "soft", "input"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class ConstraintRow:
         node: where on a grid it holds, 0 to N.
         lower: least value.
         upper: largest value.
-        kind: whether it limits controls alone.
+        kind: whether it limits the input, and whether it may be exceeded.
         on_control: whether it depends on a control.
         label: what a message calls it; default: its name.
         unit: what a violation of 1 is in the units of the user: of a scaled problem its size.
@@ -101,7 +102,7 @@ class ConstraintRows:
         label = "constraint" if place == "path" else f"{place} constraint"
         on_x, on_u = (_depends(expression, symbols) for symbols in (model.x, model.u))
         parts = (
-            (c.name, low, high)
+            (c.name, c.limits_input, low, high)
             for c in constraints
             for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
         )
@@ -112,11 +113,11 @@ class ConstraintRows:
                 node=0,
                 lower=float(low),
                 upper=float(high),
-                kind="input" if u and not x else "hard",
+                kind="input" if limits or (limits is None and u and not x) else "hard",
                 on_control=bool(u),
                 label=f"{label} '{name}'",
             )
-            for (name, low, high), x, u in zip(parts, on_x, on_u, strict=True)
+            for (name, limits, low, high), x, u in zip(parts, on_x, on_u, strict=True)
         )
         return cls(rows, expression)
 
@@ -172,6 +173,14 @@ class ConstraintRows:
         """Whether any of them can be violated at all."""
         return bool(self.rows) and self.box.is_active
 
+    def softened(self) -> "ConstraintRows":
+        """Return the rows where those that do not limit the input may be exceeded."""
+        rows = [
+            row if row.kind == "input" else replace(row, kind="soft", lower=-np.inf, upper=np.inf)
+            for row in self.rows
+        ]
+        return ConstraintRows(tuple(rows), self.expression)
+
     def excess(self, values: np.ndarray) -> np.ndarray:
         """Return by how much each value (..., m) lies outside: 0 inside, inf for no number."""
         return self.box.excess(values)
@@ -217,6 +226,15 @@ class ProblemRows:
     terminal: ConstraintRows
     invariants: ConstraintRows
     time: ConstraintRow
+
+    def softened(self) -> "ProblemRows":
+        """Return the rows where states, path and end may be exceeded, and what is sent may not."""
+        return replace(
+            self,
+            states=self.states.softened(),
+            path=self.path.softened(),
+            terminal=self.terminal.softened(),
+        )
 
 
 def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:

@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_instance, check_nominal, check_positive
+from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import (
     check_column,
@@ -37,6 +37,8 @@ class Model:
         x_nominal: a typical size of each state, a number or (nx,), for solvers to measure it by;
             None: they estimate it, see ``Solution.sizes``.
         u_nominal: the same of the controls (nu,).
+        u_is_change: whether the controls are changes of what an actuator holds, see
+            ``with_input_rate``: to hold is then to send zero.
 
     Raises:
         ProblemError: naming the symbol and the shape that are wrong.
@@ -52,6 +54,7 @@ class Model:
     u_units: tuple[str, ...] = ()
     x_nominal: ArrayLike | None = None
     u_nominal: ArrayLike | None = None
+    u_is_change: bool = False
 
     def __post_init__(self) -> None:
         """Check every shape and symbol."""
@@ -77,6 +80,7 @@ class Model:
                     f"model '{self.name}': {label}_units has {len(units)} entries "
                     f"for {size} symbols"
                 )
+        check_flag(self.u_is_change, f"model '{self.name}': u_is_change")
         for label, size in (("x_nominal", self.nx), ("u_nominal", self.nu)):
             what = f"model '{self.name}': {label}"
             object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))

@@ -56,7 +56,15 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
     def in_sizes(expression: ca.SX | float, size: np.ndarray | float) -> ca.SX:
         return ca.substitute(ca.SX(expression), symbols, measured) / ca.DM(size)
 
-    model = Model(name=m.name, x=m.x, u=m.u, f=in_sizes(m.f, rounded.x), t=m.t, dt=m.dt)
+    model = Model(
+        name=m.name,
+        x=m.x,
+        u=m.u,
+        f=in_sizes(m.f, rounded.x),
+        t=m.t,
+        dt=m.dt,
+        u_is_change=m.u_is_change,
+    )
     return ScaledOCP(
         name=ocp.name,
         model=model,
@@ -120,6 +128,7 @@ def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray) -> Constrai
         np.asarray(c.lower) / sizes,
         np.asarray(c.upper) / sizes,
         at=c.at,
+        limits_input=c.limits_input,
     )
 
 

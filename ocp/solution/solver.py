@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
+from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
 from ocp.solution.solution import Solution
 
@@ -77,6 +78,13 @@ class Solver(ABC):
         Here the same as ``build``; see ``ScalingSolver``.
         """
         return self.build(ocp)
+
+    def imposed(self, ocp: OCP) -> ProblemRows:
+        """Return the rows that a successful answer of this solver meets; here all of the problem.
+
+        A solver that makes rows soft says which, and whoever judges its plans asks for it here.
+        """
+        return ocp.rows
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Solver":
         """Return the solver as ``MPC`` runs it; here as it is.

@@ -20,7 +20,7 @@ class FormPosition(NamedTuple):
 
     name: str
     node: int
-    is_control_bound: bool
+    limits_input: bool
 
 
 class MPCForm(ABC):
@@ -40,7 +40,7 @@ class MPCForm(ABC):
         """Name the rows."""
         self.lq, self.equations = lq, equations
         self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
-        stage = list(zip(lq.rows, lq.is_control_bound, strict=True))
+        stage = list(zip(lq.rows, lq.limits_input, strict=True))
         first = [
             FormPosition(*row[:1], 0, row[1])
             for row, on in zip(stage, lq.on_control, strict=True)

@@ -11,6 +11,7 @@ from ocp.internal import (
     LQData,
     Matrices,
     MethodProgram,
+    ProblemRows,
     RunData,
     RunResult,
     ScalingSolver,
@@ -52,8 +53,9 @@ class LinearMPC(ScalingSolver):
         form: ``"sparse"`` keeps the states as unknowns, effort linear in the horizon;
             ``"condensed"`` has inputs only (2.83), pre-stabilised: good for short horizons.
         tolerance: largest accepted residual.
-        soft: weight of an exact penalty on exceeding a constraint that is not a bound of a
-            control; it has to exceed the constraints' multipliers. None: hard.
+        soft: weight of an exact penalty on exceeding a constraint that does not limit the input
+            (``Constraint(limits_input=...)``); it has to exceed the constraints' multipliers.
+            None: hard.
     """
 
     backend: str = "osqp"
@@ -69,13 +71,17 @@ class LinearMPC(ScalingSolver):
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")
 
+    def imposed(self, ocp: OCP) -> ProblemRows:
+        """Return the rows that an answer meets: with a penalty, those that limit the input."""
+        return ocp.rows if self.soft is None else ocp.rows.softened()
+
     def prepare(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""
         lq = linear_quadratic(ocp)
         form = _FORMS[self.form](lq)
         softening = None
         if self.soft is not None:
-            rows = [form.equations + i for i, p in enumerate(form.places) if not p.is_control_bound]
+            rows = [form.equations + i for i, p in enumerate(form.places) if not p.limits_input]
             softening = Softening(np.array(rows, dtype=int), self.soft)
         program = LinearMPCProgram(
             self, ocp, lq, form, qp_backend(self.backend, self.tolerance), softening
@@ -231,9 +237,9 @@ class LinearMPCProgram(MethodProgram):
         return _Verdict(answer.z[:size], y, Status.ITERATION_LIMIT, said)
 
     def _elastic_rows(self) -> np.ndarray:
-        """Rows that are relaxed to find the cause: all but dynamics and control bounds."""
+        """Rows that are relaxed to find the cause: all but dynamics and limits of the input."""
         rows = [self.form.equations + i for i, p in enumerate(self.form.places)
-                if not p.is_control_bound]  # fmt: skip
+                if not p.limits_input]  # fmt: skip
         return np.array(rows, dtype=int)
 
     def _where(self, row: int) -> str:

@@ -1,0 +1,195 @@
+"""Whatever acts is inside every row that limits what is sent."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ocp import (
+    MPC,
+    OCP,
+    Box,
+    Constraint,
+    InputSource,
+    Model,
+    Plant,
+    PlantInput,
+    ProblemError,
+    with_input_rate,
+)
+from ocp.mpc.input_limits import InputLimits, Instant
+from solvers import LinearMPC, MultipleShooting, StagewiseNewton
+
+X, U, T = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("t")
+
+
+def cart(**changes) -> OCP:
+    given = {
+        "name": "cart",
+        "model": Model(
+            name="cart",
+            x=X,
+            u=U,
+            t=T,
+            f=ca.vertcat(X[0] + 0.1 * X[1], X[1] + 0.1 * U),
+            dt=0.1,
+        ),
+        "x0": [2.0, 0.0],
+        "horizon": 10,
+        "running_cost": 10 * X[0] ** 2 + X[1] ** 2 + 0.1 * U**2,
+        "control_bounds": Box(-2.0, 2.0),
+    }
+    return OCP(**(given | changes))
+
+
+# -- soft rows ------------------------------------------------------------------------------------
+
+
+def test_a_soft_plan_is_followed_and_the_speed_brought_back() -> None:
+    limited = cart(x0=[3.0, 0.0], horizon=15, state_bounds=Box([-9, -0.6], [9, 0.6]))
+    mpc, x = MPC(ocp=limited, solver=LinearMPC(soft=1e4), dt=0.1), np.array([3.0, -1.2])
+    for k in range(12):
+        decided = mpc.step(x, 0.1 * k)
+        assert decided.source is InputSource.OPTIMAL, decided.message
+        x = np.array([x[0] + 0.1 * x[1], x[1] + 0.1 * decided.input[0]])
+    assert x[1] == pytest.approx(-0.6, abs=1e-3)
+
+
+def test_soft_rows_leave_the_actuator_its_own_bound() -> None:
+    limited = cart(state_bounds=Box([-9, -0.6], [9, 0.6]))
+    in_rates = with_input_rate(limited, rate=Box(-0.5, 0.5), weight=0.01)
+    plan = LinearMPC(soft=100.0).build(in_rates).run(x0=[2.0, -3.0, 0.0])
+    assert plan.status.is_success
+    assert np.abs(plan.x[:, 2]).max() <= 2.0 + 1e-7
+    assert plan.x[:, 1].min() < -0.6
+
+
+# -- limits ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("backup", ["default", "hold"])
+def test_an_actuator_in_rate_form_stays_within_its_bound(backup) -> None:
+    """A push that no plan can mend in one step: the increment was repeated, up to six bounds."""
+    limited = cart(control_bounds=Box(-1.0, 1.0), state_bounds=Box([-9, -0.5], [9, 0.5]))
+    in_rates = with_input_rate(limited, rate=Box(-0.2, 0.2), weight=0.1)
+    mpc = MPC(ocp=in_rates, solver=LinearMPC(), dt=0.1, backup=backup)
+    z, sources = np.zeros(3), set()
+    for k in range(30):
+        z[1] += 1.2 * (k == 5)
+        decided = mpc.step(z, 0.1 * k)
+        force = z[2] + decided.input[0]
+        sources.add(decided.source)
+        z = np.array([z[0] + 0.1 * z[1], z[1] + 0.1 * force, force])
+        assert abs(z[2]) <= 1.0 + 1e-9
+    assert sources - {InputSource.OPTIMAL}
+
+
+def test_a_bound_that_varies_with_time_holds_for_the_backup_too() -> None:
+    supply = Constraint("supply", U - 0.5 - 0.4 * ca.cos(T), upper=0.0)
+    asked = cart(constraints=(supply,))
+    mpc = MPC(ocp=asked, solver=LinearMPC(), dt=0.1, backup=lambda x, t: [2.0])
+    for k in range(20):
+        decided = mpc.step([np.nan, np.nan], 0.1 * k)
+        assert decided.source is InputSource.BACKUP
+        assert decided.input[0] == pytest.approx(0.5 + 0.4 * np.cos(0.1 * k), abs=1e-9)
+
+
+def disc() -> OCP:
+    u = ca.SX.sym("u", 2)
+    plane = Model(name="plane", x=X, u=u, f=u)
+    return OCP(
+        name="disc",
+        model=plane,
+        x0=[0.0, 0.0],
+        horizon=1.0,
+        running_cost=ca.sumsqr(X) + ca.sumsqr(u),
+        control_bounds=Box(-1.0, 1.0),
+        constraints=(Constraint("friction", ca.sumsqr(u), upper=1.0),),
+    )
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
+def test_the_nearest_point_of_a_disc(wanted: list[float]) -> None:
+    limits = InputLimits(disc(), PlantInput())
+    found = limits.nearest(np.array(wanted), Instant(np.zeros(2), 0.0, np.empty(0)))
+    assert np.linalg.norm(found) <= 1.0 + 1e-8
+    if np.linalg.norm(wanted) > 1.0 and max(map(abs, wanted)) <= 1.0:
+        np.testing.assert_allclose(found, np.array(wanted) / np.linalg.norm(wanted), atol=1e-6)
+    if np.linalg.norm(wanted) <= 1.0:
+        np.testing.assert_array_equal(found, wanted)
+
+
+@given(
+    u=st.floats(-10, 10),
+    before=st.floats(-3, 3),
+    low=st.floats(-2, 0),
+    high=st.floats(0, 2),
+)
+def test_rows_of_one_control_are_an_interval(u: float, before: float, low: float, high: float):
+    """Where the actuator is outside already, the rate's own bound wins."""
+    limited = cart(control_bounds=Box(low, high))
+    in_rates = with_input_rate(limited, rate=Box(-0.5, 0.5))
+    at = Instant(np.array([0.0, 0.0, before]), 0.0, np.empty(0))
+    found = float(InputLimits(in_rates, PlantInput()).nearest(np.array([u]), at)[0])
+    assert -0.5 <= found <= 0.5
+    if low - 0.5 <= before <= high + 0.5:
+        assert low - 1e-12 <= before + found <= high + 1e-12
+    else:
+        assert found == pytest.approx(-0.5 if before > 0 else 0.5)
+
+
+def test_only_a_path_constraint_limits_an_input() -> None:
+    with pytest.raises(ProblemError, match="path"):
+        Constraint("end", X, 0.0, 0.0, at="terminal", limits_input=True)
+    with pytest.raises(ProblemError, match="limits_input"):
+        Constraint("end", X, limits_input="yes")  # pyright: ignore[reportArgumentType]
+
+
+# -- suggested laws that see nothing --------------------------------------------------------------
+
+
+def heated(cost: ca.SX) -> OCP:
+    warmth, heat = ca.SX.sym("warmth"), ca.SX.sym("heat")
+    room = Model(name="room", x=warmth, u=heat, f=warmth + 0.1 * (5 - warmth) + heat, dt=1.0)
+    return OCP(
+        name="room",
+        model=room,
+        x0=[20.0],
+        horizon=8,
+        running_cost=ca.substitute(cost, U, heat) + 1e-4 * heat**2,
+        control_bounds=Box(0.0, 3.0),
+        state_bounds=Box(18.0, 24.0),
+    )
+
+
+def test_a_price_suggests_no_regulator() -> None:
+    law = MPC(ocp=heated(U), solver=LinearMPC(), dt=1.0).backup_law
+    assert law.name == "hold"
+    assert "sees no warmth" in law.why
+
+
+def test_a_cost_that_sees_the_state_does() -> None:
+    priced = heated(U)
+    seen = replace(priced, running_cost=priced.running_cost + (priced.model.x - 20) ** 2)
+    law = MPC(ocp=seen, solver=LinearMPC(), dt=1.0).backup_law
+    assert law.name == "saturated regulator"
+
+
+@pytest.mark.parametrize(
+    "solver", [LinearMPC(), MultipleShooting(10), MultipleShooting(10, backend="fatrop")], ids=repr
+)
+def test_a_price_is_followed_in_the_loop(solver) -> None:
+    rollout = MPC(ocp=heated(U), solver=solver, dt=1.0).run(Plant(ocp=heated(U)), [20.0], 10.0)
+    assert set(rollout.sources) == {InputSource.OPTIMAL}, rollout.messages
+    assert rollout.violation <= 1e-6
+
+
+def test_a_solver_without_rows_is_asked_the_same_way() -> None:
+    plain = cart()
+    assert StagewiseNewton(10).imposed(plain) is plain.rows
+    soft = LinearMPC(soft=1.0).imposed(cart(state_bounds=Box(-9.0, 9.0)))
+    assert {row.kind for row in soft.states.rows} == {"soft"}
+    assert {row.kind for row in soft.controls.rows} == {"input"}
