@@ -19,6 +19,7 @@ from ocp.integration.stage_hessian import stage_hessian
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.method.judged import judged
+from ocp.method.least_violating import least_violating
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
 from ocp.method.scaled_program import ScaledProgram, in_original_units, in_own_units
@@ -28,6 +29,7 @@ from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows, Violation
+from ocp.problem.elastic import elastic
 from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
@@ -78,6 +80,7 @@ __all__ = [
     "check_whole",
     "compiled",
     "differentiable_step",
+    "elastic",
     "elevated",
     "epigraph",
     "hamiltonian",
@@ -86,6 +89,7 @@ __all__ = [
     "interpolate",
     "judged",
     "jumps_along",
+    "least_violating",
     "most_violated",
     "node_fractions",
     "node_widths",

@@ -18,6 +18,7 @@ class InputSource(Enum):
     OPTIMAL = "the first control of a plan that meets the optimality conditions"
     FEASIBLE = "the first control of a new plan that meets the constraints, but is not optimal"
     SHIFTED = "the next control of an earlier plan whose remainder still meets the constraints"
+    LEAST_VIOLATING = "the first control of the plan that violates the constraints least"
     BACKUP = "the backup law's, since no plan can be used"
 
     @property
@@ -59,7 +60,7 @@ class StepReport:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Decision(StepReport):
-    """The selected input, finite and within its bounds: of a new or shifted plan, or a backup.
+    """The selected input, finite and within its limits: of a new or shifted plan, or a backup.
 
     Attributes:
         input: what the plant receives (m,).

@@ -96,7 +96,9 @@ class RunningPlant:
     def measure(self) -> np.ndarray:
         """Return the state as the sensors have it (nx,)."""
         noise = np.asarray(self.plant.measurement_noise)
-        return self.x + noise * self._rng.standard_normal(len(self.x)) if noise.any() else self.x
+        if not noise.any():
+            return self.x.copy()
+        return self.x + noise * self._rng.standard_normal(len(self.x))
 
     def advance(self, given: np.ndarray, dt: float) -> tuple[float, float, str]:
         """Apply an input (m,) for one sampling interval [s].

@@ -18,6 +18,8 @@ from ocp.solution.archive import read_archive, write_archive
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# A loop that takes more of its steps from the rungs without a good plan lives on them.
+_TOLERATED = 0.05
 # Older files have the place of a source in this list instead of its name.
 _OLDER_SOURCES = ("OPTIMAL", "FEASIBLE", "SHIFTED", "BACKUP")
 
@@ -70,6 +72,19 @@ class Rollout:
         return (
             f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
             f"violation {self.violation:.2g}, {self.decided_by}>"
+            f"{chr(10) + self.advice if self.advice else ''}"
+        )
+
+    @property
+    def advice(self) -> str:
+        """What to change where the loop lived on lower rungs; empty where it did not."""
+        lower = self.counts[InputSource.LEAST_VIOLATING] + self.counts[InputSource.BACKUP]
+        if lower <= _TOLERATED * len(self.sources):
+            return ""
+        return (
+            f"{lower} of {len(self.sources)} steps had no plan that meets the constraints: keep a "
+            "distance from hard limits of states (a priced cushion before them), make them soft, "
+            "or take a longer horizon; the messages say which constraint it was"
         )
 
     @property
@@ -171,7 +186,7 @@ class Rollout:
             raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
         names = _names_of(data["outcomes"])
         if not set(names) <= set(InputSource.__members__):
-            raise ProblemError(f"{path} is no saved rollout: a source is none of the four")
+            raise ProblemError(f"{path} is no saved rollout: a source is none of the five")
         return cls(
             plant=plant,
             **{name: data[name] for name in _ARRAYS},

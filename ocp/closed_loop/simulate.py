@@ -1,5 +1,6 @@
 """The simulated loop: measure, decide, apply, record."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -56,7 +57,9 @@ def closed_loop(
             or a delay that is compensated predicts what does not happen. These decisions are
             seen by ``watch``; those of the rollout begin at t = 0.
         sensors: (measurement, t) -> what the controller is told; for missing and wrong ones.
-        watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is.
+        watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is;
+            where it raises ``OSError``, as on a full disk, a warning says so, and it is called no
+            more.
 
     Raises:
         ProblemError: if the plant takes another input than the controller sends, the duration is
@@ -79,13 +82,14 @@ def closed_loop(
         first = check_numbers(initial_input, m, "closed loop: initial_input")
     controller.reset(first)
     late = delay_steps(controller.delay, dt)
+    observer = _Observing(watch) if watch else None
     journal = _Journal.begun(plant.ocp, plant.started(x0, seed), late)
     ahead = [] if head_start else [first] * late
     for k in range(-late if head_start else 0, steps):
         measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
         told = sensors(measured, t) if sensors else measured
         try:
-            decision = _decided(controller, told, t, plant.ocp, watch)
+            decision = _decided(controller, told, t, plant.ocp, observer)
         except ControlRefused as refusal:
             journal.ended = str(refusal)
             break
@@ -99,7 +103,7 @@ def closed_loop(
 
 
 def _decided(
-    controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: Observer | None
+    controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: "_Observing | None"
 ) -> Decision:
     """Run one step of the controller, and pass its decision or refusal to ``watch``."""
     try:
@@ -116,6 +120,24 @@ def _decided(
     if watch:
         watch(told, decision)
     return decision
+
+
+@dataclass(eq=False)
+class _Observing:
+    """Calls an observer until the system fails it: a full disk does not stop a plant."""
+
+    watch: Observer
+    failed: bool = False
+
+    def __call__(self, told: np.ndarray, decided: Decision | ControlRefused) -> None:
+        if self.failed:
+            return
+        try:
+            self.watch(told, decided)
+        except OSError as error:
+            self.failed = True
+            said = f"closed loop: {error}; the loop goes on and is watched no more"
+            warnings.warn(said, RuntimeWarning, stacklevel=3)
 
 
 @dataclass(eq=False)
@@ -145,7 +167,7 @@ class _Journal:
         cost, excess, worst = self.running.advance(acting, dt)
         if excess > self.violation:
             self.violation, self.worst = excess, worst
-        self.measured.append(told)
+        self.measured.append(np.array(told))
         self.inputs.append(acting)
         self.decisions.append(decision)
         self.costs.append(cost)

@@ -12,6 +12,7 @@ COLOURS = {
     "OPTIMAL": "#2f7fb8",
     "FEASIBLE": "#3aa98f",
     "SHIFTED": "#e8710a",
+    "LEAST_VIOLATING": "#a0429e",
     "BACKUP": "tab:red",
 }
 

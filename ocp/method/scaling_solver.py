@@ -7,6 +7,7 @@ from ocp.checks.arguments import check_instance
 from ocp.method.epigraph_program import EpigraphProgram
 from ocp.method.method_solver import MethodSolver
 from ocp.method.scaled_program import ScaledProgram
+from ocp.method.slack_program import SlackProgram
 from ocp.problem.epigraph import Epigraph
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import scaled
@@ -32,7 +33,7 @@ class ScalingSolver(MethodSolver):
             return self._build_in_sizes(ocp)
         written = self._build_in_sizes(ocp) if smooth.depends_on_data else None
         program = self.unjudged()._build_in_sizes(smooth.problem)
-        return EpigraphProgram(self, smooth, program, written)
+        return EpigraphProgram(self, smooth, SlackProgram(smooth, program), written)
 
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Return the problem with slack controls where this method treats them exactly, or None.

@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.checks.errors import OCPError, ProblemError, UnsupportedProblem
 from ocp.closed_loop.decision import ControlRefused
-from ocp.closed_loop.guarded_call import CALLBACK_ERRORS, ControlLaw, guarded_call
+from ocp.closed_loop.guarded_call import ControlLaw, guarded_call
 from ocp.mpc.backup_laws import ParametricLaw, instantaneous, saturated_lqr
 from ocp.mpc.plant_input import PlantInput
 from ocp.problem.ocp import OCP
@@ -24,6 +24,8 @@ BackupFunction = Callable[[np.ndarray, float, np.ndarray], ArrayLike]
 _PROBES, _SPREAD = 3, 0.1
 # Relative to the largest one, a smaller singular value is zero.
 _RANK = 1e-9
+# What a law raises that does not fit a problem, or whose numbers do not work out.
+_NOT_THIS_ONE = (OCPError, ArithmeticError, ValueError, RuntimeError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ def suggest_backup(ocp: OCP, dt: float, applied: PlantInput) -> Backup:
     for name, build in _SUGGESTIONS:
         try:
             law = build(ocp, dt)
-        except CALLBACK_ERRORS as error:
+        except _NOT_THIS_ONE as error:
             refused.append(f"no {name}: {error}")
         else:
             return Backup(name, _sent(law, ocp, applied), True, "; ".join(refused))

@@ -14,10 +14,11 @@ class ControllerState(NamedTuple):
         steps_late: sampling intervals from a decision to its effect.
         initial_input: acts until the first decision does (m,); None: unknown, or without a delay
             there is none.
-        plan: the last plan that meets the constraints.
+        plan: the last plan that meets the constraints, or violated them least.
         input: the last input; None before the first decision.
         pending: inputs that were decided but do not act yet, oldest first.
         misses: solver runs in a row without a plan that meets the constraints.
+        solver_raised: whether the solver raised at the last step: it is built again.
     """
 
     steps_late: int
@@ -26,6 +27,7 @@ class ControllerState(NamedTuple):
     input: np.ndarray | None
     pending: tuple[np.ndarray, ...]
     misses: int
+    solver_raised: bool = False
 
     @classmethod
     def at_start(cls, steps_late: int, acting: np.ndarray | None) -> "ControllerState":
@@ -50,20 +52,30 @@ class ControllerState(NamedTuple):
         return self.misses > 0 and self.misses % 2 == 0
 
     def after(
-        self, given: np.ndarray | None, new_plan: Solution | None, *, solver_ran: bool
+        self,
+        given: np.ndarray | None,
+        new_plan: Solution | None,
+        *,
+        solver_ran: bool,
+        meets_constraints: bool = True,
+        solver_raised: bool = False,
     ) -> "ControllerState":
         """Return what is known after a step.
 
         Args:
             given: the input; None where the step was refused.
-            new_plan: made at this step, meets the constraints; it may be late for the step.
+            new_plan: made at this step; it may be late for the step.
             solver_ran: whether the solver was run.
+            meets_constraints: whether the new plan does; else it violates them least.
+            solver_raised: whether the solver raised something.
         """
         plan = new_plan or self.plan
-        misses = 0 if new_plan else self.misses + solver_ran
+        misses = 0 if new_plan and meets_constraints else self.misses + solver_ran
         late, initial = self.steps_late, self.initial_input
         if given is None:
-            return ControllerState(late, initial, plan, self.input, self.pending, misses)
+            return ControllerState(
+                late, initial, plan, self.input, self.pending, misses, solver_raised
+            )
         ahead = (*self.pending, given)
         pending = ahead[max(0, len(ahead) - late) :]
-        return ControllerState(late, initial, plan, given, pending, misses)
+        return ControllerState(late, initial, plan, given, pending, misses, solver_raised)

@@ -21,10 +21,19 @@ from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import InputMap, PlantInput
 from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
+from ocp.problem.scaled import sizes_of
 from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
+
+# A measurement beyond this many sizes of its state is none: a sensor's largest number.
+_ABSURD = 1e8
+# A plan whose state is further from the measured one, in sizes, is no start for the next.
+_FAR = 100.0
+_NOW = np.zeros(1)
+# Of an instant, relative to the interval.
+_ROUNDING = 1e-6
 
 # t [s] -> parameters and signals of the horizon that starts there, by name.
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
@@ -39,6 +48,7 @@ class StepInputs(NamedTuple):
         start: the state then (nx,), predicted where need be; of the last plan where nothing is
             measured and there is a plan.
         parameters: of the horizon from ``applies_at`` on.
+        now: parameters when the input acts (n_p,).
         parameters_known: False where they are those of the last plan, as far as they reach.
         unsolvable: why the solver cannot be run; empty where it can.
     """
@@ -47,8 +57,25 @@ class StepInputs(NamedTuple):
     applies_at: float
     start: np.ndarray
     parameters: HorizonParameters
+    now: np.ndarray
     parameters_known: bool
     unsolvable: str
+
+
+class SolvedStep(NamedTuple):
+    """What the solver returned at one step.
+
+    Attributes:
+        plan: a new plan that meets the constraints, or None.
+        status: how the solver ended; None where it was not run, or raised.
+        message: why there is no plan, or it is not optimal.
+        raised: whether the solver raised something, and is to be built again.
+    """
+
+    plan: Solution | None
+    status: Status | None
+    message: str
+    raised: bool = False
 
 
 class SelectedInput(NamedTuple):
@@ -66,6 +93,11 @@ class SelectedInput(NamedTuple):
     clipped: float
     plan: Solution | None
 
+    @property
+    def is_new(self) -> bool:
+        """Whether its plan was made at this step."""
+        return self.source not in (InputSource.SHIFTED, InputSource.BACKUP)
+
 
 # What a rung returns: its input or None, and what to report: of a failure why.
 Rung = tuple[SelectedInput | None, str]
@@ -77,6 +109,8 @@ class FallbackLadder:
 
     Attributes:
         program: the built solver.
+        least: finds the plan that violates the constraints least; None where nothing can be
+            violated, or the solver knows no such plan.
         duration: of the horizon [s].
         rows: what a plan must meet: the rows that the solver was given.
         See ``MPC`` for all others.
@@ -84,6 +118,7 @@ class FallbackLadder:
 
     ocp: OCP
     program: Program
+    least: Program | None
     duration: float
     rows: ProblemRows
     dt: float
@@ -109,65 +144,78 @@ class FallbackLadder:
         """Return a ``Decision``, or a report where no rung holds, and what is known afterwards."""
         started = perf_counter()
         inputs = self._collect(state, x, t, parameters)
-        measured_at, applies_at, start, p, known, unsolvable = inputs
-        plan, status, message = self._solve(inputs, state)
+        solved = self._solve(inputs, state)
         used = perf_counter() - started
-        is_late = plan is not None and (used > self.budget if late is None else late)
-
-        selected, is_new = None, False
-        if is_late:
-            too_late = f"the answer came after {used:.3g} s, too late for its step"
-            message = _joined(message, too_late)
-        elif plan is not None:
-            best = InputSource.OPTIMAL if status is Status.SOLVED else InputSource.FEASIBLE
-            selected, reason = self._follow(plan, start, applies_at, p, best)
-            message = _joined(message, reason)
-            is_new = selected is not None
-        if selected is None:
-            selected, reason = self._follow_shifted(state.plan, start, applies_at, p)
-            message = _joined(message, reason)
-        if selected is None:
-            selected, reason = self._back_up(state.last_input, start, applies_at, p)
-            message = _joined(message, reason)
-
+        is_late = solved.plan is not None and (used > self.budget if late is None else late)
+        selected, reason = self._descend(inputs, state, solved, used if is_late else None)
         given = None if selected is None else selected.input
-        new_plan = plan if is_late or is_new else None
-        after = state.after(given, new_plan, solver_ran=not unsolvable)
-        residual = plan.residual if plan else np.inf
-        if selected is None:
-            report = StepReport(
-                t=measured_at,
-                applies_at=applies_at,
-                status=status,
-                message=message,
-                residual=residual,
-                late=is_late,
-                parameters=p.by_name if known else {},
-                parameters_known=known,
-                new_plan=new_plan,
-                time_used=perf_counter() - started,
-            )
-            return report, after
-        source, given, clipped, followed = selected
-        made_at = applies_at if is_new or followed is None else followed.t[0]
-        decision = Decision(
-            t=measured_at,
-            applies_at=applies_at,
-            status=status,
-            message=message,
-            residual=residual,
+        new_plan = solved.plan if is_late else None
+        if selected is not None and selected.is_new:
+            new_plan = selected.plan
+        meets = selected is None or selected.source is not InputSource.LEAST_VIOLATING
+        after = state.after(
+            given,
+            new_plan,
+            solver_ran=not inputs.unsolvable,
+            meets_constraints=meets,
+            solver_raised=solved.raised,
+        )
+        report = StepReport(
+            t=inputs.t,
+            applies_at=inputs.applies_at,
+            status=solved.status,
+            message=_joined(solved.message, reason),
+            residual=solved.plan.residual if solved.plan else np.inf,
             late=is_late,
-            parameters=p.by_name if known else {},
-            parameters_known=known,
+            parameters=inputs.parameters.by_name if inputs.parameters_known else {},
+            parameters_known=inputs.parameters_known,
             new_plan=new_plan,
             time_used=perf_counter() - started,
-            input=given,
-            source=source,
-            plan=followed,
-            age=round((applies_at - made_at) / self.dt),
-            clipped=clipped,
         )
-        return decision, after
+        if selected is None:
+            return report, after
+        return self._decision(report, selected), after
+
+    def _decision(self, report: StepReport, selected: SelectedInput) -> Decision:
+        plan = selected.plan
+        made_at = report.applies_at if selected.is_new or plan is None else plan.t[0]
+        return Decision(
+            **vars(report),
+            input=selected.input,
+            source=selected.source,
+            plan=plan,
+            age=round((report.applies_at - made_at) / self.dt),
+            clipped=selected.clipped,
+        )
+
+    def _descend(
+        self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, late: float | None
+    ) -> Rung:
+        """Return the first rung that holds, and why those before it do not.
+
+        Args:
+            inputs: of the step.
+            state: what is known from earlier ones.
+            solved: what the solver returned.
+            late: after how long its plan came, where that was too late for the step [s].
+        """
+        now, why = Instant(inputs.start, inputs.applies_at, inputs.now), ""
+        if late is not None:
+            why = f"the answer came after {late:.3g} s, too late for its step"
+        elif solved.plan is not None:
+            best = InputSource.OPTIMAL if solved.status is Status.SOLVED else InputSource.FEASIBLE
+            selected, why = self._follow(solved.plan, now, best)
+            if selected is not None:
+                return selected, why
+        selected, reason = self._follow_shifted(state.plan, now, inputs.parameters)
+        why = _joined(why, reason)
+        if selected is None and late is None and not inputs.unsolvable and self.least is not None:
+            selected, reason = self._violate_least(self.least, inputs, state, now)
+            why = _joined(why, reason)
+        if selected is None:
+            selected, reason = self._back_up(state.last_input, now)
+            why = _joined(why, reason)
+        return selected, why
 
     def _collect(
         self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
@@ -179,15 +227,40 @@ class FallbackLadder:
         if start.shape != (nx,):
             raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
         p, unknown = self._horizon_parameters(state, applies_at, given)
-        is_measured = all(map(isfinite, start.tolist()))
-        if not is_measured:  # without a plan the backup law sees what was measured
+        missing = self._missing(start)
+        at_effect = p.at(applies_at)
+        if missing:  # without a plan the backup law sees what was measured
             start = start if plan is None else plan.state(applies_at)
         elif self.compensate and state.pending:
-            at_effect = p.at(applies_at)
             for k, sent in enumerate(state.pending):
                 start = self._next_state(start, sent, t + k * self.dt, at_effect)
-        unsolvable = unknown if is_measured else _joined(unknown, "the measurement is not finite")
-        return StepInputs(float(t), applies_at, start, p, not unknown, unsolvable)
+        unsolvable = _joined(unknown, missing)
+        return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable)
+
+    def _missing(self, measured: np.ndarray) -> str:
+        """Return why a measurement counts as missing; empty where it does not."""
+        values = measured.tolist()
+        if all(
+            [-most <= value <= most for value, most in zip(values, self._plausible, strict=True)]
+        ):
+            return ""
+        if not all(map(isfinite, values)):
+            return "the measurement is not finite"
+        worst = int((np.abs(measured) / self._plausible).argmax())
+        name = self.ocp.model.x_names[worst]
+        return f"the measurement {name} = {values[worst]:.3g} cannot be meant"
+
+    @cached_property
+    def _plausible(self) -> list[float]:
+        """The largest magnitude of each state that is taken for a measurement."""
+        box = self.ocp.state_bounds
+        known = np.abs([self.ocp.start(), np.asarray(box.lower), np.asarray(box.upper)])
+        largest = np.where(np.isfinite(known), known, 0.0).max(axis=0)
+        return (_ABSURD * np.maximum(largest, self._sizes)).tolist()
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        return sizes_of(self.ocp).x
 
     def _horizon_parameters(
         self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
@@ -198,7 +271,7 @@ class FallbackLadder:
             values = self.ocp.parameter_values(given)
         else:
             try:
-                values = self.ocp.parameter_values(self.parameters(t))
+                values = self.ocp.parameter_values(_told(self.parameters, t))
             except CALLBACK_ERRORS as error:
                 if state.input is None:  # the plant has not moved yet: let it be corrected
                     raise
@@ -214,45 +287,73 @@ class FallbackLadder:
             return x + self.dt * given
         return self._check.next_state(x, given, t, p)
 
-    def _solve(
-        self, inputs: StepInputs, state: ControllerState
-    ) -> tuple[Solution | None, Status | None, str]:
-        """Return a new plan that meets the constraints, how the solver ended, and a reason."""
-        _, t, start, p, _, unsolvable = inputs
-        if unsolvable:
-            return None, None, unsolvable
-        last = None if state.cold_start else state.plan
-        guess = ShiftedPlan(last, t) if last else self.guess
+    def _solve(self, inputs: StepInputs, state: ControllerState) -> SolvedStep:
+        """Run the solver, and check that its plan meets the constraints."""
+        if inputs.unsolvable:
+            return SolvedStep(None, None, inputs.unsolvable)
+        start, t, p = inputs.start, inputs.applies_at, inputs.parameters
+        guess = self._warm_start(state, start, t)
         try:
             plan = self.program.run(x0=start, t0=t, parameters=p.by_name, guess=guess)
         except CALLBACK_ERRORS as error:
-            return None, None, f"{type(error).__name__} inside the solver: {error}"
+            said = f"{type(error).__name__} inside the solver: {error}"
+            return SolvedStep(None, None, said, raised=True)
         excess, worst = self._check.new_plan(plan, start, t, p)
         if excess > self.tolerance:
-            return None, plan.status, f"{plan.status.name}: {plan.message or worst}"
+            return SolvedStep(None, plan.status, f"{plan.status.name}: {plan.message or worst}")
         if plan.status is Status.SOLVED:
-            return plan, plan.status, ""
+            return SolvedStep(plan, plan.status, "")
         reason = f"{plan.status.name}: {plan.message or plan.status.value}"
-        return plan, plan.status, reason
+        return SolvedStep(plan, plan.status, reason)
+
+    def _warm_start(
+        self, state: ControllerState, start: np.ndarray, t: float
+    ) -> InitialGuess | None:
+        """Return the last plan moved to now, unless it is of no use; then where a loop begins."""
+        last = state.plan
+        if last is None or state.cold_start or t < last.t[0]:
+            return self.guess
+        shifted = ShiftedPlan(last, t)
+        expected = shifted.sample("x", _NOW, len(start))[0]
+        # A plan from a wrong measurement, or one that a jump of the state has overtaken.
+        if (np.abs(expected - start) > _FAR * (self._sizes + np.abs(start))).any():
+            return self.guess
+        return shifted
 
     # -- the rungs ---------------------------------------------------------------------------
 
-    def _follow_shifted(
-        self, plan: Solution | None, start: np.ndarray, t: float, p: HorizonParameters
-    ) -> Rung:
+    def _follow_shifted(self, plan: Solution | None, now: Instant, p: HorizonParameters) -> Rung:
         """Follow the last good plan, if its remainder meets the constraints."""
         if plan is None:
             return None, "there is no earlier plan"
-        excess, worst = self._check.remainder(plan, start, t, p)
+        if now.t < plan.t[0] - _ROUNDING * self.dt:
+            return None, f"time went back to {now.t:.6g} s, the plan begins at {plan.t[0]:.6g} s"
+        excess, worst = self._check.remainder(plan, now.x, now.t, p)
         if excess > self.tolerance:
             return None, f"the earlier plan: {worst}"
-        return self._follow(plan, start, t, p, InputSource.SHIFTED)
+        return self._follow(plan, now, InputSource.SHIFTED)
 
-    def _back_up(
-        self, last: np.ndarray | None, start: np.ndarray, t: float, p: HorizonParameters
+    def _violate_least(
+        self, least: Program, inputs: StepInputs, state: ControllerState, now: Instant
     ) -> Rung:
+        """Follow the plan that violates the constraints on states least; say by how much."""
+        p, guess = inputs.parameters, self._warm_start(state, now.x, now.t)
+        try:
+            plan = least.run(x0=now.x, t0=now.t, parameters=p.by_name, guess=guess)
+        except CALLBACK_ERRORS as error:
+            return None, f"no least violating plan: {type(error).__name__}: {error}"
+        excess, worst = self._check.least_violating(plan, now.x, now.t, p)
+        if excess > self.tolerance:
+            return None, f"no least violating plan: {plan.status.name}: {plan.message or worst}"
+        selected, reason = self._follow(plan, now, InputSource.LEAST_VIOLATING)
+        return (
+            selected,
+            reason or f"no plan meets the constraints; {worst or 'this one nearly does'}",
+        )
+
+    def _back_up(self, last: np.ndarray | None, now: Instant) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
-        size, now = self.applied.size(self.ocp), Instant(start, t, p.at(t))
+        size = self.applied.size(self.ocp)
         if self.ocp.model.u_is_change:  # to hold is to change nothing
             last = np.zeros(size)
         given, reason = self.backup.input(*now, size=size, last=last)
@@ -261,15 +362,13 @@ class FallbackLadder:
         selected, problem = self._bounded(given, InputSource.BACKUP, now)
         return selected, _joined(reason, problem)
 
-    def _follow(
-        self, plan: Solution, x: np.ndarray, t: float, p: HorizonParameters, source: InputSource
-    ) -> Rung:
-        """Take the input that a plan has at t [s]."""
+    def _follow(self, plan: Solution, now: Instant, source: InputSource) -> Rung:
+        """Take the input that a plan has now."""
         # A control that moves is held at its value in the middle of the interval, its mean but
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
-        u, now = plan_controls(plan, t + middle), Instant(x, t, p.at(t))
-        return self._bounded(self._input_map(x, u, t, now.p), source, now, plan)
+        u = plan_controls(plan, now.t + middle)
+        return self._bounded(self._input_map(now.x, u, now.t, now.p), source, now, plan)
 
     def _bounded(
         self, given: np.ndarray, source: InputSource, now: Instant, plan: Solution | None = None
@@ -294,6 +393,14 @@ class FallbackLadder:
     @cached_property
     def _input_limits(self) -> InputLimits:
         return InputLimits(self.ocp, self.applied)
+
+
+def _told(parameters: Parameters, t: float) -> Mapping[str, ArrayLike]:
+    """Return what a callback says of the horizon from t [s] on; None says nothing."""
+    given = parameters(t)
+    if given is None:
+        raise ProblemError("the callback returned None")
+    return given
 
 
 def _joined(said: str, more: str) -> str:

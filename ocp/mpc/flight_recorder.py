@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError
-from ocp.closed_loop.decision import ControlRefused, Decision
+from ocp.closed_loop.decision import ControlRefused, Decision, InputSource
 from ocp.mpc.mpc import MPC
 from ocp.mpc.record_format import Record, header, packed, read_header, records
 from ocp.solution.archive import opened
@@ -143,7 +143,13 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
             if k in wanted:
                 wanted.remove(k)
                 yield found
-        state = state.after(record.input, _plan(mpc, record), solver_ran=record.is_solvable)
+        state = state.after(
+            record.input,
+            _plan(mpc, record),
+            solver_ran=record.is_solvable,
+            meets_constraints=record.source is not InputSource.LEAST_VIOLATING,
+            solver_raised=record.is_solvable and record.status is None,
+        )
     if wanted:
         raise ProblemError(f"{path} has no step {min(wanted)}")
 

@@ -129,8 +129,8 @@ class InputLimits:
     @cached_property
     def _rows(self) -> ConstraintRows:
         """The path constraints that limit the input."""
-        path, is_control = self.ocp.rows.path, self.applied.what == "control"
-        return path.where(np.array([row.kind == "input" and is_control for row in path.rows]))
+        rows = self.ocp.rows.path.of_kind("input")
+        return rows if self.applied.what == "control" else rows.where(np.zeros(len(rows)))
 
     @cached_property
     def _function(self) -> BufferedFunction:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import (
     check_callable,
+    check_flag,
     check_instance,
     check_not_negative,
     check_numbers,
@@ -43,8 +44,13 @@ class MPC:
        model is run under its controls, and it must meet the constraints;
     2. the remainder of the last good plan, ``SHIFTED``, run on the model from the measured
        state: it must meet the constraints;
-    3. the ``backup`` law, ``BACKUP``;
-    4. ``ControlRefused``.
+    3. where no plan meets the constraints, the new plan that violates those on states least,
+       ``LEAST_VIOLATING``, within all limits of the input; the message says by how much and where;
+    4. the ``backup`` law, ``BACKUP``;
+    5. ``ControlRefused``.
+
+    A measurement that is not finite, or absurd (1e8 sizes of its state), counts as missing. A
+    solver that raised is built again before the next step. A callback may raise anything.
 
     After two runs of the solver in a row without a plan that meets the constraints, every other one
     starts cold, as the first step does, since the last plan may mislead it.
@@ -72,6 +78,8 @@ class MPC:
         delay: time from measurement to effect [s], a multiple of dt.
         compensate: whether the state is predicted over the delay, with the inputs that are
             already on their way; if not, the plan starts from the measured state.
+        least_violating: whether the plan that violates the constraints least is followed where no
+            plan meets them. A step that needs it takes a second run of the solver.
         budget: time for a step [s]; None: unlimited.
         tolerance: by how much an input may leave its bounds, or a plan the constraints, before
             that is a failure; an input that leaves them by less is clipped, and it is recorded.
@@ -97,6 +105,7 @@ class MPC:
     guess: InitialGuess | None = None
     delay: float = 0.0
     compensate: bool = True
+    least_violating: bool = True
     budget: float | None = None
     tolerance: float = 1e-6
     compiled: bool = True
@@ -118,6 +127,7 @@ class MPC:
         return FallbackLadder(
             ocp=self.ocp,
             program=solver.build(self.ocp),
+            least=solver.least_violating(self.ocp) if self.least_violating else None,
             duration=self.ocp.duration,
             rows=solver.imposed(self.ocp),
             dt=self.dt,
@@ -154,6 +164,7 @@ class MPC:
         if self.budget is not None:
             check_positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
         check_not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
+        check_flag(self.least_violating, f"MPC of {name}: least_violating")
 
     @property
     def is_stateful(self) -> bool:
@@ -169,7 +180,9 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        self.state = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
+        raised = hasattr(self, "state") and self.state.solver_raised
+        begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
+        self.state = begun._replace(solver_raised=raised)
 
     def step(
         self,
@@ -192,6 +205,8 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
+        if self.state.solver_raised:
+            self._ladder = self._built()
         report, self.state = self._ladder.step(self.state, x, t, late=late, parameters=parameters)
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)

@@ -1,15 +1,17 @@
 """What a plan would do from now on: run the model under it, and check the constraints."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 
+from ocp.checks.arguments import class_in_words
 from ocp.closed_loop.model_rollout import IntervalParameters, ModelRollout
 from ocp.problem.constraint_rows import ProblemRows
+from ocp.problem.fingerprint import differing, fingerprint
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
 from ocp.solution.shifted_plan import plan_controls
@@ -86,6 +88,8 @@ class PlanCheck:
         A converged plan is checked as it is; another one by running the model under its controls.
         Infinite where the solver's status says that there is no plan.
         """
+        if foreign := self._foreign(plan, start, t):
+            return np.inf, foreign
         if plan.status.is_success:
             if not self._is_constrained:
                 return 0.0, ""
@@ -94,6 +98,40 @@ class PlanCheck:
         if plan.status not in _USABLE:
             return np.inf, plan.status.value
         return self.remainder(plan, start, t, p)
+
+    def least_violating(
+        self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> tuple[float, str]:
+        """Return by how much a plan exceeds the limits of the input, and what it violates most.
+
+        Infinite where there is no plan that is worth applying.
+        """
+        if foreign := self._foreign(plan, start, t):
+            return np.inf, foreign
+        if not plan.status.is_success and plan.status not in _USABLE:
+            return np.inf, plan.status.value
+        u, between = plan_controls(plan, plan.t[:-1]), p.between(plan.t)
+        model = self._rollout(len(u))
+        result = model.of(start, u, plan.t, between)
+        if not isfinite(result.excess):
+            return np.inf, result.worst
+        inputs, _ = self._input_rollout(len(u)).excess(result.x, u, plan.t, between)
+        end = model.end_excess(result.x[-1], plan.t[-1], p.at(plan.t[-1]))
+        return inputs, max((result.excess, result.worst), end)[1]
+
+    def _foreign(self, plan: Solution, start: np.ndarray, t: float) -> str:
+        """Return in what a solver's answer is not one to the question; empty where it is."""
+        if not isinstance(plan, Solution):
+            return f"the solver returned {class_in_words(plan)}, no solution"
+        if plan.problem is not self.ocp and self._differs(plan.problem):
+            return "the plan is one of another problem"
+        if abs(plan.t[0] - t) > _ROUNDING * self.dt:
+            return f"the plan begins at {plan.t[0]:.6g} s, not at {t:.6g} s"
+        if abs(plan.duration - self.ocp.duration) > _ROUNDING * self.dt:
+            return f"the plan is {plan.duration:.6g} s long, not {self.ocp.duration:.6g} s"
+        if (np.abs(plan.x[0] - start) > _ROUNDING * (1.0 + np.abs(start))).any():
+            return f"the plan begins at {plan.x[0]}, not at {start}"
+        return ""
 
     def remainder(
         self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
@@ -123,6 +161,13 @@ class PlanCheck:
         if n not in self._rollouts:
             self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled, rows=self.rows)
         return self._rollouts[n]
+
+    def _input_rollout(self, n: int) -> ModelRollout:
+        """Return a roll-out that checks the limits of the input alone."""
+        return replace(self._rollout(n), rows=self.ocp.rows.softened())
+
+    def _differs(self, problem: OCP) -> bool:
+        return bool(differing(fingerprint(problem), fingerprint(self.ocp)))
 
     @cached_property
     def _is_constrained(self) -> bool:

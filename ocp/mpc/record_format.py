@@ -22,7 +22,14 @@ _SHAPE = Struct("<2i")
 # Instead of the number of columns: the array has one axis.
 _VECTOR = -1
 # A place in one of these is a byte of the head; the first entry of each: there is none.
-_SOURCES: tuple[InputSource | None, ...] = (None, *InputSource)
+_SOURCES: tuple[InputSource | None, ...] = (
+    None,
+    InputSource.OPTIMAL,
+    InputSource.FEASIBLE,
+    InputSource.SHIFTED,
+    InputSource.BACKUP,
+    InputSource.LEAST_VIOLATING,
+)
 _STATUSES: tuple[Status | None, ...] = (None, *Status)
 _KINDS: tuple[ControlKind | None, ...] = (
     None,

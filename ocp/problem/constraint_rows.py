@@ -156,6 +156,10 @@ class ConstraintRows:
         index = np.flatnonzero(chosen).tolist()
         return ConstraintRows(tuple(self.rows[i] for i in index), self.expression[index, :])
 
+    def of_kind(self, kind: RowKind) -> "ConstraintRows":
+        """Return the rows of one kind."""
+        return self.where(np.array([row.kind == kind for row in self.rows], dtype=bool))
+
     @cached_property
     def box(self) -> Box:
         """Their bounds, each (m,)."""

@@ -98,6 +98,14 @@ class Solver(ABC):
         """
         return self
 
+    def least_violating(self, ocp: OCP) -> Program | None:
+        """Build what finds the trajectory that violates the hard rows of a problem least.
+
+        It meets those that limit the input; see ``elastic``. None where no row is hard, or this
+        method knows no such trajectory, as here.
+        """
+        return None
+
     def unjudged(self) -> "Solver":
         """Return the solver for a method that compares its answers with the referee by itself.
 

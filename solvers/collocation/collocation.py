@@ -5,18 +5,20 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, Solution, Status, UnsupportedProblem
+from ocp import OCP, InitialGuess, Program, Solution, Status, UnsupportedProblem
 from ocp.internal import (
     Epigraph,
     MethodProgram,
     RunData,
     RunResult,
     ScalingSolver,
+    check_flag,
     check_instance,
     check_positive,
     check_whole,
     elevated,
     epigraph,
+    least_violating,
     segment_gaps,
 )
 from solvers.collocation.collocated_problem import CollocatedProblem, CollocationUnknowns
@@ -67,6 +69,7 @@ class Collocation(ScalingSolver):
         verbose: let the backend print.
         time_limit: for each run of the backend [s]; inf: unlimited; None: unlimited, but 10 s in
             ``MPC``.
+        feasibility_restoration: see ``MultipleShooting``; off in a control loop.
     """
 
     intervals: int = 25
@@ -78,6 +81,7 @@ class Collocation(ScalingSolver):
     accuracy: float = 1e-2
     verbose: bool = False
     time_limit: float | None = None
+    feasibility_restoration: bool = True
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -88,6 +92,7 @@ class Collocation(ScalingSolver):
         else:
             check_instance(self.mesh, Mesh, "collocation: mesh")
         check_positive(self.accuracy, "collocation: accuracy", finite=False)
+        check_flag(self.feasibility_restoration, "collocation: feasibility_restoration")
         self.nlp_backend.check()
 
     def mesh_of(self, ocp: OCP) -> Mesh:
@@ -112,11 +117,15 @@ class Collocation(ScalingSolver):
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Collocation":
         """Set what is left open; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, time_limit=limit, judged=False)
+        return replace(self, time_limit=limit, judged=False, feasibility_restoration=False)
 
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Replace every kink: slacks and maxima meet at the collocation points."""
         return epigraph(ocp)
+
+    def least_violating(self, ocp: OCP) -> Program | None:
+        """Build the problem with a slack for its hard rows; see ``Solver``."""
+        return least_violating(self.unjudged(), ocp)
 
     def prepare(self, ocp: OCP) -> "CollocationProgram":
         """Transcribe the problem and set the backend up.
@@ -164,7 +173,13 @@ class CollocationProgram(MethodProgram):
     @cached_property
     def _nlp_run(self) -> NlpRun:
         """Kept, since it keeps the elastic problem of the feasibility restoration."""
-        return NlpRun(self.transcription, self.nlp, self.solver.accuracy, self._state_error)
+        return NlpRun(
+            transcription=self.transcription,
+            nlp=self.nlp,
+            accuracy=self.solver.accuracy,
+            state_error=self._state_error,
+            feasibility_restoration=self.solver.feasibility_restoration,
+        )
 
     # -- the first iterate -------------------------------------------------------------------
 

@@ -84,6 +84,10 @@ class BetweenNodes(ScalingSolver):
         """Replace what the inner solver would."""
         return self.inner.smooth_form(ocp)
 
+    def least_violating(self, ocp: OCP) -> Program | None:
+        """Build what the inner solver would, at its nodes."""
+        return self.inner.least_violating(ocp)
+
     def prepare(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator
+from ocp import OCP, RK4, InitialGuess, Integrator, Program
 from ocp.internal import (
     Epigraph,
     MethodProgram,
@@ -19,6 +19,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     epigraph,
+    least_violating,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
@@ -99,13 +100,23 @@ class MultipleShooting(ScalingSolver):
         return self.accuracy
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "MultipleShooting":
-        """Set what is left open; see ``Solver``."""
+        """Set what is left open, and nothing that takes a second run; see ``Solver``."""
         limit = time_limit if self.time_limit is None else self.time_limit
-        return replace(self, compiled=compiled or self.compiled, time_limit=limit, judged=False)
+        return replace(
+            self,
+            compiled=compiled or self.compiled,
+            time_limit=limit,
+            judged=False,
+            feasibility_restoration=False,
+        )
 
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Replace the kinks that a held control decides."""
         return epigraph(ocp, held=True)
+
+    def least_violating(self, ocp: OCP) -> Program | None:
+        """Build the problem with a slack for its hard rows; see ``Solver``."""
+        return least_violating(self.unjudged(), ocp)
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""

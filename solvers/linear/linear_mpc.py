@@ -1,11 +1,11 @@
 """Constrained linear optimal control: one quadratic program, solved again and again."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, Program, Status, Work, linear_quadratic
 from ocp.internal import (
     LinearQuadratic,
     LQData,
@@ -17,6 +17,7 @@ from ocp.internal import (
     ScalingSolver,
     check_choice,
     check_positive,
+    elastic,
     start_violation,
 )
 from solvers.linear import regulator_gains as recursion
@@ -74,6 +75,13 @@ class LinearMPC(ScalingSolver):
     def imposed(self, ocp: OCP) -> ProblemRows:
         """Return the rows that an answer meets: with a penalty, those that limit the input."""
         return ocp.rows if self.soft is None else ocp.rows.softened()
+
+    def least_violating(self, ocp: OCP) -> Program | None:
+        """Build the program with soft rows; None where they are soft already, or there are none."""
+        relaxed = elastic(ocp)
+        if relaxed is None or self.soft is not None:
+            return None
+        return replace(self.unjudged(), soft=relaxed.penalty).build(ocp)
 
     def prepare(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""

@@ -152,12 +152,13 @@ def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
         return program.solver
 
     plain = MultipleShooting(10)
-    assert used(plain) == replace(plain, time_limit=10.0)
+    in_a_loop = replace(plain, feasibility_restoration=False)
+    assert used(plain) == replace(in_a_loop, time_limit=10.0)
     for limit in (0.5, np.inf):
         assert used(replace(plain, time_limit=limit)).time_limit == limit
-    assert used(scripted({})).inner == replace(plain, time_limit=10.0)
+    assert used(scripted({})).inner == replace(in_a_loop, time_limit=10.0)
     assert plain.for_control_loop(compiled=True, time_limit=10.0) == replace(
-        plain, time_limit=10.0, compiled=True
+        in_a_loop, time_limit=10.0, compiled=True
     )
     shooting = IndirectShooting()
     assert shooting.for_control_loop(compiled=False, time_limit=10.0) == shooting
@@ -231,12 +232,14 @@ def test_an_infeasible_plan_that_misses_its_end_is_not_followed() -> None:
     """Along the way it meets everything; the end that it cannot reach is a constraint too."""
     ocp = cart()
     there = Constraint("there", ocp.model.x[0], -3.0, -2.9, at="terminal")
-    mpc = MPC(ocp=replace(ocp, constraints=(there,)), solver=MultipleShooting(10), dt=DT,
-              backup=lambda x, t: [0.0])  # fmt: skip
-    decision = mpc.step([1.0, 0.0], 0.0)
-    assert decision.status is Status.INFEASIBLE
-    assert decision.source is InputSource.BACKUP
-    assert "'there' is violated" in decision.message
+    asked = replace(ocp, constraints=(there,))
+    for follows, source in ((True, InputSource.LEAST_VIOLATING), (False, InputSource.BACKUP)):
+        mpc = MPC(ocp=asked, solver=MultipleShooting(10), dt=DT, backup=lambda x, t: [0.0],
+                  least_violating=follows)  # fmt: skip
+        decision = mpc.step([1.0, 0.0], 0.0)
+        assert decision.status is not Status.SOLVED
+        assert decision.source is source
+        assert ("'there' is violated" in decision.message) is follows
 
 
 def test_when_the_plan_is_used_up_the_backup_law_takes_over() -> None:

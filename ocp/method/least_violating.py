@@ -1,0 +1,14 @@
+"""A solver's program for the trajectory that violates the hard rows of a problem least."""
+
+from ocp.method.slack_program import SlackProgram
+from ocp.problem.elastic import elastic
+from ocp.problem.ocp import OCP
+from ocp.solution.solver import Program, Solver
+
+
+def least_violating(solver: Solver, ocp: OCP) -> Program | None:
+    """Build it with a solver that takes path constraints; None where no row is hard."""
+    relaxed = elastic(ocp)
+    if relaxed is None:
+        return None
+    return SlackProgram(relaxed, solver.build(relaxed.problem))

@@ -1,0 +1,131 @@
+r"""The problem whose states may exceed what limits them, at a high price.
+
+.. math::
+
+    \min \; J + w \int s + \tfrac12 s^2 \, dt + w \, T \, |e(x(t_f))|^2 \quad \text{s.t.} \quad
+    \underline c - S s \le c(x, u, t) \le \overline c + S s, \quad s \ge 0
+
+for the rows c that are hard: bounds of states and path constraints that do not limit the input. S
+are their nominal sizes, e the relative excess of these rows and of the terminal constraints at the
+end, where no control acts. The penalty is exact along the way where w exceeds the multipliers
+[Nocedal & Wright 2006, section 17.2].
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint_rows import ConstraintRows
+from ocp.problem.ocp import OCP
+from ocp.problem.scaled import sizes_of
+
+# Weight of a violation of one nominal size all along, relative to the nominal cost.
+_PRICE = 1e4
+_NAME = "excess"
+
+
+def elastic(ocp: OCP) -> "Elastic | None":
+    """Return the problem with a slack control for its hard rows, or None where it has none."""
+    rows = ocp.rows
+    hard = [part for part in (rows.states, rows.path, rows.terminal) if _hard(part)]
+    return Elastic(ocp) if hard else None
+
+
+@dataclass(frozen=True, eq=False)
+class Elastic:
+    """A problem that no trajectory may meet, and the one that it violates least.
+
+    Attributes:
+        original: the problem as it was written.
+    """
+
+    original: OCP
+
+    @cached_property
+    def problem(self) -> OCP:
+        """The problem whose last control is the slack."""
+        ocp, m = self.original, self.original.model
+        s, rows = ca.SX.sym(_NAME), self._along
+        weight, unit = ca.DM(self.penalty), self._sizes
+        lower, upper = np.asarray(rows.box.lower), np.asarray(rows.box.upper)
+        above = np.flatnonzero(np.isfinite(upper)).tolist()
+        below = np.flatnonzero(np.isfinite(lower)).tolist()
+        scaled = rows.expression / ca.DM(unit)
+        kept = [*ocp.at("initial")]
+        if inputs := ocp.rows.path.of_kind("input"):
+            limits = inputs.box.lower, inputs.box.upper
+            kept.append(Constraint("input", inputs.expression, *limits, limits_input=True))
+        if above:
+            kept.append(Constraint("upper", scaled[above] - s, upper=(upper / unit)[above]))
+        if below:
+            kept.append(Constraint("lower", scaled[below] + s, lower=(lower / unit)[below]))
+        box = ocp.control_bounds
+        return replace(
+            ocp,
+            name=f"{ocp.name}, least violation",
+            model=replace(
+                m,
+                u=ca.vertcat(m.u, s),
+                u_units=(*m.u_units, "") if m.u_units else (),
+                u_nominal=None if m.u_nominal is None else np.append(m.u_nominal, 1.0),
+            ),
+            running_cost=ca.SX(ocp.running_cost) + weight * (s + s**2 / 2),
+            terminal_cost=ca.SX(ocp.terminal_cost) + weight * ocp.duration * self._at_end,
+            control_bounds=Box(np.append(box.lower, 0.0), np.append(box.upper, np.inf)),
+            state_bounds=Box(),
+            constraints=tuple(kept),
+            smoothness=min(ocp.smoothness, 1),
+            guess=None,
+        )
+
+    @property
+    def penalty(self) -> float:
+        """The price w of a relative violation, per second or step."""
+        horizon = self.original.steps or self.original.duration
+        return _PRICE * sizes_of(self.original).cost / float(horizon)
+
+    def slacks(self, fractions: np.ndarray, x: np.ndarray | None, u: np.ndarray) -> np.ndarray:
+        """Return the slack of a first guess: none, (len(fractions), 1)."""
+        return np.zeros((len(u), 1))
+
+    @cached_property
+    def _along(self) -> ConstraintRows:
+        """The hard rows at every instant."""
+        return self.original.rows.states + self.original.rows.path.of_kind("hard")
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        sizes, rows = sizes_of(self.original), self.original.rows.path
+        names = dict.fromkeys(row.name for row in rows.rows)
+        path = np.concatenate([[], *[sizes.rows[name] for name in names]])
+        hard = np.array([row.kind == "hard" for row in rows.rows], dtype=bool)
+        return np.concatenate([sizes.x, path[hard]])
+
+    @cached_property
+    def _at_end(self) -> ca.SX:
+        """The squared relative excess at the end, where no control acts."""
+        rows, sizes = self.original.rows, sizes_of(self.original)
+        free = ~self._along.on_control
+        names = dict.fromkeys(row.name for row in rows.terminal.rows)
+        ends = np.concatenate([[], *[sizes.rows[name] for name in names]])
+        both = self._along.where(free) + rows.terminal
+        unit = np.concatenate([self._sizes[free], ends])
+        total = ca.SX(0)
+        for row, value, size in zip(
+            both.rows, ca.vertsplit(both.expression), unit.tolist(), strict=True
+        ):
+            if row.is_equation:
+                total += ((value - row.lower) / size) ** 2
+                continue
+            if np.isfinite(row.upper):
+                total += ca.fmax(0.0, (value - row.upper) / size) ** 2
+            if np.isfinite(row.lower):
+                total += ca.fmax(0.0, (row.lower - value) / size) ** 2
+        return total
+
+
+def _hard(rows: ConstraintRows) -> bool:
+    return rows.of_kind("hard").is_imposed
