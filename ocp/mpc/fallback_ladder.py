@@ -1,6 +1,6 @@
-"""One control step: collect inputs, solve, check, select the first rung that holds, report."""
+"""One control step: solve, check, select the first rung that holds, report."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_numeric, check_real
+from ocp.checks.arguments import class_in_words
 from ocp.checks.errors import ProblemError
 from ocp.closed_loop.decision import Decision, InputSource, StepReport
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
@@ -19,6 +19,7 @@ from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.input_limits import InputLimits, Instant
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import InputMap, PlantInput
+from ocp.mpc.step_inputs import InputCollector, Parameters, StepInputs, joined
 from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import sizes_of
@@ -27,39 +28,11 @@ from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
 
-# A measurement beyond this many sizes of its state is none: a sensor's largest number.
-_ABSURD = 1e8
 # A plan whose state is further from the measured one, in sizes, is no start for the next.
 _FAR = 100.0
 _NOW = np.zeros(1)
 # Of an instant, relative to the interval.
 _ROUNDING = 1e-6
-
-# t [s] -> parameters and signals of the horizon that starts there, by name.
-Parameters = Callable[[float], Mapping[str, ArrayLike]]
-
-
-class StepInputs(NamedTuple):
-    """The data of one control step.
-
-    Attributes:
-        t: when the state was measured [s].
-        applies_at: when the input acts [s].
-        start: the state then (nx,), predicted where need be; of the last plan where nothing is
-            measured and there is a plan.
-        parameters: of the horizon from ``applies_at`` on.
-        now: parameters when the input acts (n_p,).
-        parameters_known: False where they are those of the last plan, as far as they reach.
-        unsolvable: why the solver cannot be run; empty where it can.
-    """
-
-    t: float
-    applies_at: float
-    start: np.ndarray
-    parameters: HorizonParameters
-    now: np.ndarray
-    parameters_known: bool
-    unsolvable: str
 
 
 class SolvedStep(NamedTuple):
@@ -111,7 +84,6 @@ class FallbackLadder:
         program: the built solver.
         least: finds the plan that violates the constraints least; None where nothing can be
             violated, or the solver knows no such plan.
-        duration: of the horizon [s].
         rows: what a plan must meet: the rows that the solver was given.
         See ``MPC`` for all others.
     """
@@ -119,7 +91,6 @@ class FallbackLadder:
     ocp: OCP
     program: Program
     least: Program | None
-    duration: float
     rows: ProblemRows
     dt: float
     applied: PlantInput
@@ -143,7 +114,7 @@ class FallbackLadder:
     ) -> tuple[StepReport, ControllerState]:
         """Return a ``Decision``, or a report where no rung holds, and what is known afterwards."""
         started = perf_counter()
-        inputs = self._collect(state, x, t, parameters)
+        inputs = self._inputs.collect(state, x, t, parameters)
         solved = self._solve(inputs, state)
         used = perf_counter() - started
         is_late = solved.plan is not None and (used > self.budget if late is None else late)
@@ -164,7 +135,7 @@ class FallbackLadder:
             t=inputs.t,
             applies_at=inputs.applies_at,
             status=solved.status,
-            message=_joined(solved.message, reason),
+            message=joined(solved.message, reason),
             residual=solved.plan.residual if solved.plan else np.inf,
             late=is_late,
             parameters=inputs.parameters.by_name if inputs.parameters_known else {},
@@ -208,84 +179,14 @@ class FallbackLadder:
             if selected is not None:
                 return selected, why
         selected, reason = self._follow_shifted(state.plan, now, inputs.parameters)
-        why = _joined(why, reason)
+        why = joined(why, reason)
         if selected is None and late is None and not inputs.unsolvable and self.least is not None:
             selected, reason = self._violate_least(self.least, inputs, state, now)
-            why = _joined(why, reason)
+            why = joined(why, reason)
         if selected is None:
             selected, reason = self._back_up(state.last_input, now)
-            why = _joined(why, reason)
+            why = joined(why, reason)
         return selected, why
-
-    def _collect(
-        self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
-    ) -> StepInputs:
-        """Check the measurement, get the parameters, and predict the state over the delay."""
-        name, nx, plan = self.ocp.name, self.ocp.model.nx, state.plan
-        applies_at = check_real(t, f"MPC of {name}: t [s]") + self.delay
-        start = check_numeric(x, f"MPC of {name}: x")
-        if start.shape != (nx,):
-            raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
-        p, unknown = self._horizon_parameters(state, applies_at, given)
-        missing = self._missing(start)
-        at_effect = p.at(applies_at)
-        if missing:  # without a plan the backup law sees what was measured
-            start = start if plan is None else plan.state(applies_at)
-        elif self.compensate and state.pending:
-            for k, sent in enumerate(state.pending):
-                start = self._next_state(start, sent, t + k * self.dt, at_effect)
-        unsolvable = _joined(unknown, missing)
-        return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable)
-
-    def _missing(self, measured: np.ndarray) -> str:
-        """Return why a measurement counts as missing; empty where it does not."""
-        values = measured.tolist()
-        if all(
-            [-most <= value <= most for value, most in zip(values, self._plausible, strict=True)]
-        ):
-            return ""
-        if not all(map(isfinite, values)):
-            return "the measurement is not finite"
-        worst = int((np.abs(measured) / self._plausible).argmax())
-        name = self.ocp.model.x_names[worst]
-        return f"the measurement {name} = {values[worst]:.3g} cannot be meant"
-
-    @cached_property
-    def _plausible(self) -> list[float]:
-        """The largest magnitude of each state that is taken for a measurement."""
-        box = self.ocp.state_bounds
-        known = np.abs([self.ocp.start(), np.asarray(box.lower), np.asarray(box.upper)])
-        largest = np.where(np.isfinite(known), known, 0.0).max(axis=0)
-        return (_ABSURD * np.maximum(largest, self._sizes)).tolist()
-
-    @cached_property
-    def _sizes(self) -> np.ndarray:
-        return sizes_of(self.ocp).x
-
-    def _horizon_parameters(
-        self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
-    ) -> tuple[HorizonParameters, str]:
-        """Return the parameters of a horizon from t [s] on, or those of the last plan and why."""
-        start, unknown = t, ""
-        if given is not None or self.parameters is None:
-            values = self.ocp.parameter_values(given)
-        else:
-            try:
-                values = self.ocp.parameter_values(_told(self.parameters, t))
-            except CALLBACK_ERRORS as error:
-                if state.input is None:  # the plant has not moved yet: let it be corrected
-                    raise
-                unknown = f"no parameters from t = {t:g} s on: {error}"
-                start, known = (state.plan.t[0], state.plan.parameters) if state.plan else (t, None)
-                values = self.ocp.parameter_values(known)
-        by_name = values.as_dict() if values.entries else {}
-        return HorizonParameters(values, by_name, start, self.duration), unknown
-
-    def _next_state(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
-        """Return the model's state one interval after t [s] under an input, parameters held."""
-        if self.applied.what == "rate":
-            return x + self.dt * given
-        return self._check.next_state(x, given, t, p)
 
     def _solve(self, inputs: StepInputs, state: ControllerState) -> SolvedStep:
         """Run the solver, and check that its plan meets the constraints."""
@@ -294,7 +195,7 @@ class FallbackLadder:
         start, t, p = inputs.start, inputs.applies_at, inputs.parameters
         guess = self._warm_start(state, start, t)
         try:
-            plan = self.program.run(x0=start, t0=t, parameters=p.by_name, guess=guess)
+            plan = _plan_of(self.program, inputs, guess)
         except CALLBACK_ERRORS as error:
             said = f"{type(error).__name__} inside the solver: {error}"
             return SolvedStep(None, None, said, raised=True)
@@ -339,7 +240,7 @@ class FallbackLadder:
         """Follow the plan that violates the constraints on states least; say by how much."""
         p, guess = inputs.parameters, self._warm_start(state, now.x, now.t)
         try:
-            plan = least.run(x0=now.x, t0=now.t, parameters=p.by_name, guess=guess)
+            plan = _plan_of(least, inputs, guess)
         except CALLBACK_ERRORS as error:
             return None, f"no least violating plan: {type(error).__name__}: {error}"
         excess, worst = self._check.least_violating(plan, now.x, now.t, p)
@@ -360,7 +261,7 @@ class FallbackLadder:
         if given is None:
             return None, reason
         selected, problem = self._bounded(given, InputSource.BACKUP, now)
-        return selected, _joined(reason, problem)
+        return selected, joined(reason, problem)
 
     def _follow(self, plan: Solution, now: Instant, source: InputSource) -> Rung:
         """Take the input that a plan has now."""
@@ -383,6 +284,22 @@ class FallbackLadder:
         return SelectedInput(source, inside, excess, plan), ""
 
     @cached_property
+    def _inputs(self) -> InputCollector:
+        return InputCollector(
+            ocp=self.ocp,
+            check=self._check,
+            dt=self.dt,
+            applied=self.applied,
+            parameters=self.parameters,
+            delay=self.delay,
+            compensate=self.compensate,
+        )
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        return sizes_of(self.ocp).x
+
+    @cached_property
     def _check(self) -> PlanCheck:
         return PlanCheck(self.ocp, self.dt, self.compiled, self.rows)
 
@@ -395,13 +312,18 @@ class FallbackLadder:
         return InputLimits(self.ocp, self.applied)
 
 
-def _told(parameters: Parameters, t: float) -> Mapping[str, ArrayLike]:
-    """Return what a callback says of the horizon from t [s] on; None says nothing."""
-    given = parameters(t)
-    if given is None:
-        raise ProblemError("the callback returned None")
-    return given
+def _plan_of(program: Program, inputs: StepInputs, guess: InitialGuess | None) -> Solution:
+    """Run a program for a step; whatever it raises is for the caller.
 
-
-def _joined(said: str, more: str) -> str:
-    return f"{said}; {more}" if said and more else said or more
+    Raises:
+        ProblemError: if it returns something else than a solution.
+    """
+    plan = program.run(
+        x0=inputs.start,
+        t0=inputs.applies_at,
+        parameters=inputs.parameters.by_name,
+        guess=guess,
+    )
+    if not isinstance(plan, Solution):
+        raise ProblemError(f"it returned {class_in_words(plan)}, no solution")
+    return plan

@@ -22,8 +22,9 @@ from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import Observer, closed_loop
 from ocp.mpc.backup_selection import Backup, BackupOption, select_backup
 from ocp.mpc.controller_state import ControllerState
-from ocp.mpc.fallback_ladder import FallbackLadder, Parameters
+from ocp.mpc.fallback_ladder import FallbackLadder
 from ocp.mpc.plant_input import PlantInput
+from ocp.mpc.step_inputs import Parameters
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import InitialGuess, Solver
 
@@ -128,7 +129,6 @@ class MPC:
             ocp=self.ocp,
             program=solver.build(self.ocp),
             least=solver.least_violating(self.ocp) if self.least_violating else None,
-            duration=self.ocp.duration,
             rows=solver.imposed(self.ocp),
             dt=self.dt,
             applied=self.applied,

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ocp.checks.arguments import class_in_words
 from ocp.closed_loop.model_rollout import IntervalParameters, ModelRollout
 from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.fingerprint import differing, fingerprint
@@ -121,8 +120,6 @@ class PlanCheck:
 
     def _foreign(self, plan: Solution, start: np.ndarray, t: float) -> str:
         """Return in what a solver's answer is not one to the question; empty where it is."""
-        if not isinstance(plan, Solution):
-            return f"the solver returned {class_in_words(plan)}, no solution"
         if plan.problem is not self.ocp and self._differs(plan.problem):
             return "the plan is one of another problem"
         if abs(plan.t[0] - t) > _ROUNDING * self.dt:

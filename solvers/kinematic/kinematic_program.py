@@ -27,7 +27,7 @@ class KinematicProgram:
         inverses: one for each.
         decoupled: whether damping keeps out of the null space.
         speed_limit: of every joint [rad/s].
-        tolerance: by how much the first task may be missed.
+        tolerance: by how much the first task with a target may be missed.
         levels: (q, t) -> activations, then J and desired_velocity of every task.
         error: (q, t) -> norm of each task's error.
     """
@@ -86,8 +86,8 @@ class KinematicProgram:
             t0: initial time [s].
 
         Returns:
-            the motion; ``MYOPIC`` where the first task was done, ``INFEASIBLE`` where it was
-            missed (a target outside the workspace, a singular configuration), ``DIVERGED``
+            the motion; ``MYOPIC`` where the first task with a target was done, ``INFEASIBLE`` where
+            it was missed (a target outside the workspace, a singular configuration), ``DIVERGED``
             where a task stopped being finite: the motion then ends before.
 
         Raises:
@@ -107,7 +107,7 @@ class KinematicProgram:
             rows.append(rows[-1] + (t[k + 1] - t[k]) * velocities[-1])
         q, t = np.array(rows), t[: len(rows)]
         errors = np.array(self.error.map(len(q))(q.T, t[None, :])).T
-        status, why = self._verdict(t, errors[:, 0])
+        status, why = self._verdict(t, errors)
         return KinematicRun(
             t=t,
             q=q,
@@ -117,14 +117,20 @@ class KinematicProgram:
             message=message or why,
         )
 
-    def _verdict(self, t: np.ndarray, error: np.ndarray) -> tuple[Status, str]:
-        """Was the first task done? An arm may start off its path, but has to stay once there."""
-        limit = self.tolerance
+    def _verdict(self, t: np.ndarray, errors: np.ndarray) -> tuple[Status, str]:
+        """Was the first target met? An arm may start off its path, but has to stay once there.
+
+        A task without a target, as one that keeps off a limit, has nothing to miss.
+        """
+        limit, targets = self.tolerance, [i for i, task in enumerate(self.tasks) if task.has_target]
+        if not targets:
+            return Status.MYOPIC, ""
+        error = errors[:, targets[0]]
         there = error <= limit
         missed = (np.cumsum(there) > 0) & ~there if there.any() else ~there
         if not missed.any():
             return Status.MYOPIC, ""
-        k, name = int(missed.argmax()), self.tasks[0].name
+        k, name = int(missed.argmax()), self.tasks[targets[0]].name
         return Status.INFEASIBLE, (
             f"task '{name}' is missed by more than {limit:g} from t = {t[k]:.4g} s on, by "
             f"{error.max():.3g} at most: its target is out of reach, or the arm is singular"

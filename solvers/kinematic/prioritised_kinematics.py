@@ -29,7 +29,7 @@ class PrioritisedKinematics:
         decoupled: whether damping keeps out of the null space, so that no task disturbs a
             higher one; ``False``: (3.17) in (3.11) as the thesis has it.
         speed_limit: where a joint would be faster [rad/s], all are slowed down alike.
-        tolerance: the first task counts as missed by more than this, in its own unit.
+        tolerance: the first task with a target counts as missed by more than this, in its unit.
 
     Raises:
         ProblemError: if there is no task, if they have different q or t or the same name, or

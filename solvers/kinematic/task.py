@@ -84,6 +84,11 @@ class Task:
         return ca.densify(self.rate - ca.jacobian(self.value, self.t))
 
     @property
+    def has_target(self) -> bool:
+        """Whether it is known how far the task is from done."""
+        return bool(self.error.numel())
+
+    @property
     def is_rigid(self) -> bool:
         """Whether the task is always on and contradicts no other."""
         on = self.activation

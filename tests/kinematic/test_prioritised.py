@@ -193,6 +193,18 @@ def test_joint_limit_as_an_obstacle() -> None:
     assert held.errors["position"].max() < 1e-3
 
 
+def test_a_run_is_judged_by_its_first_target() -> None:
+    """With a joint limit as the first task it was MYOPIC wherever the hand went."""
+    limit = START[1] - 0.05
+    guard = repel("limit", q=Q, t=T, distance=Q[1] - limit, repulsion=Repulsion(0.5, 0.1, 0.2))
+    beyond = PrioritisedKinematics((guard, position((-9.0, -9.0)))).build()
+    run = beyond.run(START, duration=1.0)
+    assert run.status is Status.INFEASIBLE
+    assert "'position' is missed" in run.message
+    near = PrioritisedKinematics((guard, position((-0.05, -0.05)))).build()
+    assert near.run(START, duration=1.0).status is Status.MYOPIC
+
+
 @pytest.mark.parametrize("kind", ["limits", "dexterity"])
 def test_potentials_descend_in_the_null_space(kind: str) -> None:
     if kind == "limits":

@@ -1,0 +1,144 @@
+"""The data of a control step: what was measured, and what is known of the horizon."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ocp.checks.arguments import check_numeric, check_real
+from ocp.checks.errors import ProblemError
+from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
+from ocp.mpc.controller_state import ControllerState
+from ocp.mpc.plan_check import HorizonParameters, PlanCheck
+from ocp.mpc.plant_input import PlantInput
+from ocp.problem.ocp import OCP
+from ocp.problem.scaled import sizes_of
+
+# A measurement beyond this many sizes of its state is none: a sensor's largest number.
+_ABSURD = 1e8
+
+# t [s] -> parameters and signals of the horizon that starts there, by name.
+Parameters = Callable[[float], Mapping[str, ArrayLike]]
+
+
+class StepInputs(NamedTuple):
+    """The data of one control step.
+
+    Attributes:
+        t: when the state was measured [s].
+        applies_at: when the input acts [s].
+        start: the state then (nx,), predicted where need be; of the last plan where nothing is
+            measured, NaN where there is no plan either.
+        parameters: of the horizon from ``applies_at`` on.
+        now: parameters when the input acts (n_p,).
+        parameters_known: False where they are those of the last plan, as far as they reach.
+        unsolvable: why the solver cannot be run; empty where it can.
+    """
+
+    t: float
+    applies_at: float
+    start: np.ndarray
+    parameters: HorizonParameters
+    now: np.ndarray
+    parameters_known: bool
+    unsolvable: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class InputCollector:
+    """Collects the data of every step; see ``MPC`` for the options.
+
+    Attributes:
+        check: the controller's model.
+    """
+
+    ocp: OCP
+    check: PlanCheck
+    dt: float
+    applied: PlantInput
+    parameters: Parameters | None
+    delay: float
+    compensate: bool
+
+    def collect(
+        self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
+    ) -> StepInputs:
+        """Check the measurement, get the parameters, and predict the state over the delay."""
+        name, nx, plan = self.ocp.name, self.ocp.model.nx, state.plan
+        applies_at = check_real(t, f"MPC of {name}: t [s]") + self.delay
+        start = check_numeric(x, f"MPC of {name}: x")
+        if start.shape != (nx,):
+            raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
+        p, unknown = self._horizon_parameters(state, applies_at, given)
+        missing = self._missing(start)
+        at_effect = p.at(applies_at)
+        if missing:
+            start = np.full(nx, np.nan) if plan is None else plan.state(applies_at)
+        elif self.compensate and state.pending:
+            for k, sent in enumerate(state.pending):
+                start = self._next_state(start, sent, t + k * self.dt, at_effect)
+        unsolvable = joined(unknown, missing)
+        return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable)
+
+    def _missing(self, measured: np.ndarray) -> str:
+        """Return why a measurement counts as missing; empty where it does not."""
+        values = measured.tolist()
+        if all(
+            [-most <= value <= most for value, most in zip(values, self._plausible, strict=True)]
+        ):
+            return ""
+        if not all(map(isfinite, values)):
+            return "the measurement is not finite"
+        worst = int((np.abs(measured) / self._plausible).argmax())
+        name = self.ocp.model.x_names[worst]
+        return f"the measurement {name} = {values[worst]:.3g} cannot be meant"
+
+    @cached_property
+    def _plausible(self) -> list[float]:
+        """The largest magnitude of each state that is taken for a measurement."""
+        box = self.ocp.state_bounds
+        known = np.abs([self.ocp.start(), np.asarray(box.lower), np.asarray(box.upper)])
+        largest = np.where(np.isfinite(known), known, 0.0).max(axis=0)
+        return (_ABSURD * np.maximum(largest, sizes_of(self.ocp).x)).tolist()
+
+    def _horizon_parameters(
+        self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
+    ) -> tuple[HorizonParameters, str]:
+        """Return the parameters of a horizon from t [s] on, or those of the last plan and why."""
+        start, unknown = t, ""
+        if given is not None or self.parameters is None:
+            values = self.ocp.parameter_values(given)
+        else:
+            try:
+                values = self.ocp.parameter_values(_told(self.parameters, t))
+            except CALLBACK_ERRORS as error:
+                if state.input is None:  # the plant has not moved yet: let it be corrected
+                    raise
+                unknown = f"no parameters from t = {t:g} s on: {error}"
+                start, known = (state.plan.t[0], state.plan.parameters) if state.plan else (t, None)
+                values = self.ocp.parameter_values(known)
+        by_name = values.as_dict() if values.entries else {}
+        return HorizonParameters(values, by_name, start, self.ocp.duration), unknown
+
+    def _next_state(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
+        """Return the model's state one interval after t [s] under an input, parameters held."""
+        if self.applied.what == "rate":
+            return x + self.dt * given
+        return self.check.next_state(x, given, t, p)
+
+
+def _told(parameters: Parameters, t: float) -> Mapping[str, ArrayLike]:
+    """Return what a callback says of the horizon from t [s] on; None says nothing."""
+    given = parameters(t)
+    if given is None:
+        raise ProblemError("the callback returned None")
+    return given
+
+
+def joined(said: str, more: str) -> str:
+    """Return two reasons as one; either may be empty."""
+    return f"{said}; {more}" if said and more else said or more
