@@ -3,7 +3,7 @@
 import re
 import zlib
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any, Literal
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+from numpy.lib.format import MAGIC_PREFIX
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import DamagedFile, ProblemError
@@ -26,6 +27,8 @@ _SEAL = re.compile(re.escape(_MARK) + rb"([0-9a-f]{64})\Z")
 _NO_COMMENT = re.compile(rb"PK\x05\x06.{16}\x00\x00\Z", re.DOTALL)
 # Of an entry: signature, five fields, checksum, two sizes, lengths of its name and of what follows.
 _ENTRY = Struct("<4s5H3I2H")
+# The same in the table at the end, with what else it knows, last the place of the entry.
+_LISTED = Struct("<4s6H3I3H8xI")
 # What NumPy and zipfile raise of content that is none.
 _NO_CONTENT = (
     OSError, ValueError, TypeError, LookupError, ArithmeticError, EOFError, MemoryError,
@@ -78,10 +81,13 @@ def whole_arrays(path: str | Path) -> dict[str, np.ndarray]:
 
     Raises:
         ProblemError: if the file cannot be read.
+        DamagedFile: if something in it is whole, and no array.
     """
     check_instance(path, (str, Path), "the path of a damaged file")
     with named(path, "damaged file", "read"):
-        return dict(_whole(Path(path).read_bytes()))
+        found = dict(_whole(Path(path).read_bytes()))
+    with made_of(path, "array"):
+        return {name: np.load(BytesIO(array)) for name, array in found.items()}
 
 
 @contextmanager
@@ -136,19 +142,27 @@ def _advice(content: bytes) -> str:
     return f". {count} of its arrays are whole: ocp.whole_arrays(path) reads them" if count else ""
 
 
-def _whole(content: bytes) -> Iterator[tuple[str, np.ndarray]]:
-    has_table = b"PK\x05\x06" in content
+def _whole(content: bytes) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of every entry that is whole, whatever is around it."""
+    listed = set(_listed(content))
     for place in re.finditer(rb"PK\x03\x04", content):
-        if len(content) < place.start() + _ENTRY.size:
+        at = place.start()
+        if len(content) < at + _ENTRY.size:
             return
-        _, *_, checksum, _, _, length, extra = _ENTRY.unpack_from(content, place.start())
-        begin = place.start() + _ENTRY.size
+        _, *_, checksum, _, _, length, extra = _ENTRY.unpack_from(content, at)
+        begin = at + _ENTRY.size
         name, packed = content[begin : begin + length], content[begin + length + extra :]
-        if has_table and content.count(name) < 2:
-            continue
-        try:
-            array = zlib.decompressobj(-zlib.MAX_WBITS).decompress(packed)
-            if zlib.crc32(array) == checksum:
-                yield name.decode().removesuffix(".npy"), np.load(BytesIO(array))
-        except _NO_CONTENT:
-            continue
+        if not listed or (at, checksum, name) in listed:
+            with suppress(zlib.error, UnicodeDecodeError):
+                array = zlib.decompressobj(-zlib.MAX_WBITS).decompress(packed)
+                if zlib.crc32(array) == checksum and array.startswith(MAGIC_PREFIX):
+                    yield name.decode().removesuffix(".npy"), array
+
+
+def _listed(content: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Yield place, checksum and name of every entry in the table at the end, where it is there."""
+    for place in re.finditer(rb"PK\x01\x02", content):
+        begin = place.start() + _LISTED.size
+        if len(content) >= begin:
+            _, *_, checksum, _, _, length, _, _, at = _LISTED.unpack_from(content, place.start())
+            yield at, checksum, content[begin : begin + length]
