@@ -15,10 +15,7 @@ def write_all(descriptor: int, content: bytes) -> None:
     """
     rest = memoryview(content)
     while rest:
-        written = os.write(descriptor, rest)
-        if not written:
-            raise OSError(EIO, os.strerror(EIO))
-        rest = rest[written:]
+        rest = _after_a_write(descriptor, rest)
 
 
 def append(descriptor: int, content: bytes) -> None:
@@ -27,14 +24,23 @@ def append(descriptor: int, content: bytes) -> None:
     Raises:
         OSError: if it cannot be written as a whole; the file ends where it did.
     """
-    end, done = os.fstat(descriptor).st_size, False
+    rest = memoryview(content)
     try:
-        write_all(descriptor, content)
-        done = True
+        while rest:
+            rest = _after_a_write(descriptor, rest)
     finally:
-        if not done:
+        if rest:
             with suppress(OSError):  # a pipe
+                end = os.fstat(descriptor).st_size - (len(content) - len(rest))
                 os.ftruncate(descriptor, end)
+
+
+def _after_a_write(descriptor: int, rest: memoryview) -> memoryview:
+    """Write what the kernel takes at once; return what is left."""
+    written = os.write(descriptor, rest)
+    if not written:
+        raise OSError(EIO, os.strerror(EIO))
+    return rest[written:]
 
 
 def append_line(path: Path, line: bytes) -> None:

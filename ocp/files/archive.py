@@ -1,5 +1,6 @@
 """Arrays by name as one ``.npz`` file, with the checksum of the whole file at its end."""
 
+import os
 import re
 import zlib
 from collections.abc import Collection, Iterator, Mapping
@@ -46,8 +47,9 @@ def write_archive(path: str | Path, what: str, content: Mapping[str, Any]) -> Pa
     check_instance(path, (str, Path), f"the path of a saved {what}")
     path = Path(path)
     path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")
+    sealed = _sealed(content)
     with named(path, f"saved {what}", "written"):
-        write_file(path, _sealed(content))
+        write_file(path, sealed)
     return path
 
 
@@ -110,6 +112,13 @@ def named(path: str | Path, what: str, done: Literal["read", "written"]) -> Iter
     Raises:
         ProblemError: for every OSError inside, or a path that no file can have.
     """
+    try:
+        os.lstat(path)
+    except ValueError as reason:  # a zero byte, half a character
+        said = f"no file has the name {str(path)!r}"
+        raise ProblemError(f"the {what} cannot be {done}: {said}") from reason
+    except OSError:
+        pass
     try:
         yield
     except OSError as reason:

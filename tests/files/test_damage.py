@@ -1,14 +1,16 @@
 """One flipped bit, or a lost end: never another value, never another error than the named one."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from ocp import Compiler, DamagedFile, Solution, records, whole_arrays
+from ocp import Compiler, DamagedFile, ProblemError, Solution, records, whole_arrays
 from ocp.codegen.compile import compiled
 from ocp.codegen.kept_library import keep_library, kept_library
+from ocp.files.frame import whole_frames
 from tests.files.examples import KINDS, STEPS, Kind, function, problem, record, same, solution
 
 FLIPS = [300, pytest.param(10_000, marks=pytest.mark.slow)]
@@ -189,3 +191,30 @@ def test_a_damaged_library_is_not_loaded(tmp_path, number):
     built.write_bytes(content)
     assert keep_library(built, tmp_path / key) == library
     assert kept_library(tmp_path, key, library.suffix) == library
+
+
+def test_a_flight_record_of_before_is_read(tmp_path):
+    """Version 3 has no frames, no checksums, and says less in its first line."""
+    file = tmp_path / "flight"
+    record(file)
+    whole = list(records(file))
+    first, rest = file.read_bytes().split(b"\n", 1)
+    said = json.loads(first)
+    old = {name: said[name] for name in ("problem", "solver", "parameters", "acting")}
+    line = json.dumps({"format": "flight record, version 3", **old}).encode()
+    unframed = b"".join(packed for _, packed in whole_frames(rest))
+    file.write_bytes(line + b"\n" + unframed + unframed[:50])
+    assert same(list(records(file)), whole)
+    file.write_bytes(line + b"\n" + unframed[:44] + b"\xff" + unframed[45:])
+    with pytest.raises(DamagedFile, match=r"flight is damaged in step 0: these bytes are no step"):
+        list(records(file))
+
+
+@pytest.mark.parametrize("path", ["a\0b", "\ud800"])
+def test_a_name_that_no_file_can_have_is_refused(path):
+    with pytest.raises(ProblemError, match="no file has the name"):
+        solution().save(path)
+    with pytest.raises(ProblemError, match="no file has the name"):
+        Solution.load(path, problem())
+    with pytest.raises(ProblemError, match="no file has the name"):
+        list(records(path))
