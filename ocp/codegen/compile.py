@@ -55,9 +55,9 @@ class Compiler:
         flags: its options.
         cache: folder; None: ``ocp-toolkit`` in the user's cache folder (``$XDG_CACHE_HOME``
             where it is set).
-        time_limit: of one build [s]; then the compiler is ended with all it has started.
         optimised: up to so many characters of C. Beyond, a compiler would optimise for minutes,
             and ``-O0`` is added to the flags: still several times faster than interpreted.
+        time_limit: of one build [s]; then the compiler is ended with all it has started.
     """
 
     command: str | None = None

@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 from stat import S_ISREG, S_ISVTX, S_IWGRP, S_IWOTH
 
-from ocp.files.draft import sync_folder
+from ocp.files.draft import sync_file, sync_folder
 
 _DIGEST = 32
 
@@ -42,11 +42,7 @@ def keep_library(built: Path, stem: Path) -> Path:
         OSError: if that fails.
     """
     built.chmod(0o700)
-    descriptor = os.open(built, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync_file(built)
     library = stem.with_name(_name(stem.name, built, built.suffix))
     built.replace(library)
     sync_folder(library.parent)

@@ -39,7 +39,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         yield draft
         if path.exists():
             shutil.copymode(path, draft)
-        _bring_to_disk(draft)
+        sync_file(draft)
         draft.replace(path)
         sync_folder(path.parent)
 
@@ -88,6 +88,19 @@ def remove_abandoned(parent: Path) -> None:
                 os.close(lock)
 
 
+def sync_file(file: Path) -> None:
+    """Bring the content of a file to the disk.
+
+    Raises:
+        OSError: if that fails.
+    """
+    descriptor = os.open(file, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def sync_folder(folder: Path) -> None:
     """Bring the names in a folder to the disk, where the system can."""
     with suppress(OSError):
@@ -113,11 +126,3 @@ def _begun(parent: Path) -> tuple[Path, int | None]:
             if folder.exists():
                 return folder, lock
             os.close(lock)
-
-
-def _bring_to_disk(file: Path) -> None:
-    descriptor = os.open(file, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.sweep.rows_file import read_found
 from ocp import Compiler, DamagedFile, ProblemError, Solution, records, whole_arrays
 from ocp.codegen.compile import compiled
 from ocp.codegen.kept_library import keep_library, kept_library
@@ -51,6 +52,18 @@ def test_a_flipped_bit_is_never_another_value(example, number):
     for bit in rng.integers(8 * len(content), size=number):
         file.write_bytes(flipped(content, int(bit)))
         assert is_right(kind, file, whole), f"bit {bit}"
+
+
+def test_a_row_that_is_not_read_is_spoken_of(tmp_path):
+    file = tmp_path / "results.jsonl"
+    KINDS[file.name].write(file)
+    content, whole = file.read_bytes(), read_found(file)
+    rng = np.random.default_rng(0)
+    for bit in rng.integers(8 * len(content), size=300):
+        file.write_bytes(flipped(content, int(bit)))
+        found = read_found(file)
+        assert found == whole or found.notes(file), f"bit {bit}"
+        assert not found.foreign, "damage is no other version"
 
 
 @pytest.mark.parametrize("number", CUTS)
