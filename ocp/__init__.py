@@ -1,12 +1,13 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
-from ocp.checks.errors import OCPError, ProblemError, SolverError, UnsupportedProblem
+from ocp.checks.errors import DamagedFile, OCPError, ProblemError, SolverError, UnsupportedProblem
 from ocp.closed_loop.decision import Controller, ControlRefused, Decision, InputSource, StepReport
 from ocp.closed_loop.feedback_law import FeedbackLaw
 from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import closed_loop
 from ocp.codegen.compile import Compiler, InterpretedWarning
+from ocp.files.archive import whole_arrays
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
 from ocp.linear.input_rate import with_input_rate
@@ -18,7 +19,8 @@ from ocp.mpc.backup_laws import instantaneous, saturated_lqr
 from ocp.mpc.flight_recorder import FlightRecorder, Replay, replay, replay_all
 from ocp.mpc.mpc import MPC
 from ocp.mpc.plant_input import PlantInput
-from ocp.mpc.record_format import Record, records
+from ocp.mpc.record_file import records
+from ocp.mpc.record_format import Record
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.guess import Guess
@@ -39,6 +41,7 @@ __all__ = [
     "Constraint",
     "ControlRefused",
     "Controller",
+    "DamagedFile",
     "Decision",
     "Euler",
     "Evaluation",
@@ -84,6 +87,7 @@ __all__ = [
     "saturated_lqr",
     "solve",
     "terminal_set",
+    "whole_arrays",
     "with_input_rate",
     "with_stationary_end",
     "with_terminal_set",

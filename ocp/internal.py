@@ -13,6 +13,9 @@ from ocp.checks.arguments import (
 )
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.compile import c_code, compiled
+from ocp.files.append import append_line
+from ocp.files.checksum import with_checksum, without_checksum
+from ocp.files.draft import replacing, write_file
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
@@ -66,6 +69,7 @@ __all__ = [
     "Stage",
     "Transcription",
     "Violation",
+    "append_line",
     "applied",
     "bernstein",
     "c_code",
@@ -93,6 +97,7 @@ __all__ = [
     "most_violated",
     "node_fractions",
     "node_widths",
+    "replacing",
     "scaled",
     "segment_gaps",
     "sizes_of",
@@ -102,4 +107,7 @@ __all__ = [
     "symbol_type",
     "time_unit",
     "walk",
+    "with_checksum",
+    "without_checksum",
+    "write_file",
 ]

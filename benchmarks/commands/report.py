@@ -9,6 +9,7 @@ from benchmarks.commands.command import Command
 from benchmarks.report import report_page
 from benchmarks.sweep.row import RESULTS
 from benchmarks.sweep.rows_file import read_found
+from ocp.internal import write_file
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -30,7 +31,7 @@ def _run(options: Namespace, console: Console) -> int:
         return 2
     page: Path = options.out or options.folder / "report.html"
     try:
-        page.write_text(report_page(found.rows, notes, "Benchmarks"), encoding="utf-8")
+        write_file(page, report_page(found.rows, notes, "Benchmarks").encode())
     except OSError as wrong:
         say(f"the report cannot be written: {wrong}")
         return 2

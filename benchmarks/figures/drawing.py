@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Picture
 
+from ocp.internal import replacing
+
 _DPI = 100
 # Characters of a caption on an inch of width.
 _CAPTION = 14.5
@@ -44,8 +46,9 @@ def write(drawing: Drawing, stem: str, out: Path) -> tuple[Path, Path]:
     # Spaces that textwrap does not break at: "N = 5" stays together.
     caption = fill(drawing.sentence.replace(" = ", "\u00a0=\u00a0"), width)
     drawing.picture.suptitle(caption, fontsize=9, ha="left", x=0.01)
-    drawing.picture.savefig(picture, dpi=_DPI)
-    with data.open("w", newline="", encoding="utf-8") as file:
+    with replacing(picture) as draft:
+        drawing.picture.savefig(draft, dpi=_DPI)
+    with replacing(data) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(drawing.columns)
         columns = [np.asarray(column).tolist() for column in drawing.columns.values()]

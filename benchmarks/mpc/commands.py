@@ -35,7 +35,11 @@ def print_loops(
     horizons: Sequence[float] = HORIZONS,
 ) -> int:
     """Run the arm's loops that are not in ``out`` yet and print the rows; return 0."""
-    rows = list(sweep(out, scenarios, controllers, horizons))
+
+    def say(note: str) -> None:
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
+
+    rows = list(sweep(out, scenarios, controllers, horizons, say))
     console.print(loops_table(rows, "closed loops of the arm, dt = 20 ms, cost by the plant"))
     console.print(crossings_table(rows))
     return 0

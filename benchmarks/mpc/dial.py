@@ -1,6 +1,6 @@
 """The dial from instantaneous control to the optimum: the length of the horizon (3.19)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -23,10 +23,14 @@ SCENARIOS = tuple(f"arm-{i:03d}" for i in range(1, 11))
 
 
 def sweep(
-    out: Path, scenarios: Sequence[str], kinds: Sequence[str], horizons: Sequence[float]
+    out: Path,
+    scenarios: Sequence[str],
+    kinds: Sequence[str],
+    horizons: Sequence[float],
+    say: Callable[[str], object] = lambda note: None,
 ) -> Iterator[LoopRow]:
-    """Run the loops that ``out`` has no row of, and yield the rows of all."""
-    known = {row.key: row for row in read_loops(out / LOOPS)}
+    """Run the loops that ``out`` has no row of, and yield the rows of all; see ``read_loops``."""
+    known = {row.key: row for row in read_loops(out / LOOPS, say)}
     for name in scenarios:
         wanted = [(INSTANTANEOUS, 0.0), *((kind, h) for h in horizons for kind in kinds)]
         for kind, horizon in wanted:

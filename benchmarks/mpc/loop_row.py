@@ -1,13 +1,15 @@
 """One closed loop as a row, one JSON object a line."""
 
-import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 
+from benchmarks.sweep.json_line import check_types, entry_of, line_of
 from ocp import Rollout
+from ocp.internal import append_line
 
 PART = 0.8  # [s], the simulation of the thesis
 
@@ -91,24 +93,46 @@ class LoopRow:
         return self.case, self.controller, self.horizon, self.ending
 
     def append_to(self, file: Path) -> None:
-        """Write it."""
+        """Write it as a whole and bring it to the disk.
+
+        Raises:
+            OSError: if it cannot be written; the file is as it was.
+        """
         file.parent.mkdir(parents=True, exist_ok=True)
-        with file.open("a", encoding="utf-8") as lines:
-            lines.write(json.dumps(asdict(self), allow_nan=False) + "\n")
+        append_line(file, line_of(self).encode())
 
 
-def read_loops(file: Path) -> tuple[LoopRow, ...]:
-    """Return the rows of a file, the newest of each key."""
+def read_loops(file: Path, say: Callable[[str], object] = lambda note: None) -> tuple[LoopRow, ...]:
+    """Return the rows of a file, the newest of each key.
+
+    Args:
+        file: of rows; none: there are none.
+        say: is called with a sentence for every line that is no row.
+    """
     if not file.exists():
         return ()
-    rows = map(_row, file.read_text(encoding="utf-8").splitlines())
-    return tuple({row.key: row for row in rows}.values())
+    rows = {}
+    for number, line in enumerate(file.read_bytes().split(b"\n"), start=1):
+        if not line.strip():
+            continue
+        try:
+            row = _row(line.decode())
+        except ValueError as wrong:
+            say(f"line {number} of {file.name} is no row: {wrong}")
+        else:
+            rows[row.key] = row
+    return tuple(rows.values())
 
 
 def _row(line: str) -> LoopRow:
-    entry = json.loads(line)
+    entry = entry_of(line)
     if "outcomes" in entry:  # as older files have it
         entry["sources"] = entry.pop("outcomes")
+    hints = get_type_hints(LoopRow)
+    entry = {"ending": "none", "settled": None, **entry}
+    if entry.keys() != hints.keys():
+        raise ValueError(f"its fields are {', '.join(sorted(entry))}")
+    check_types(entry, hints)
     return LoopRow(**{**entry, "times": tuple(entry["times"])})
 
 

@@ -4,6 +4,8 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ocp.internal import with_checksum, without_checksum, write_file
+
 VERSION = 1
 
 
@@ -74,23 +76,21 @@ class PeerReport:
     def write(self, file: Path) -> None:
         """Write it as JSON, in one piece."""
         file.parent.mkdir(parents=True, exist_ok=True)
-        new = file.with_suffix(".new")
-        text = json.dumps({"version": VERSION, **asdict(self)}, indent=1, allow_nan=False)
-        new.write_text(text + "\n", encoding="utf-8")
-        new.replace(file)
+        content = with_checksum({"version": VERSION, **asdict(self)})
+        write_file(file, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
     @classmethod
     def read(cls, file: Path) -> "PeerReport":
-        """Read it.
+        """Read it; a file of an earlier version has no checksum.
 
         Raises:
-            BadResults: if it is not there, torn, or of another version.
+            BadResults: if it is not there, torn, damaged, or of another version.
         """
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
+            data = without_checksum(json.loads(file.read_text(encoding="utf-8")))
             if data.pop("version") != VERSION:
                 raise BadResults(f"{file.name} is of another version of this program")
             data["entries"] = tuple(Entry(**entry) for entry in data["entries"])
             return cls(**data)
-        except (OSError, KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
-            raise BadResults(f"{file.name} cannot be read: {error}") from error
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as no:
+            raise BadResults(f"{file.name} cannot be read: {no}") from no

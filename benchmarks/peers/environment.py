@@ -12,6 +12,7 @@ from pathlib import Path
 
 from benchmarks.peers.peer import PeerPackage
 from ocp import Compiler
+from ocp.internal import write_file
 
 _BIN = "Scripts" if sys.platform == "win32" else "bin"
 _STAMP = "installed.txt"
@@ -86,7 +87,7 @@ class Environment:
             self._call([*pip, "--quiet", "-r", str(wanted)])
         finally:
             wanted.unlink()
-        (self.folder / _STAMP).write_text(self.peer.wanted, encoding="utf-8")
+        write_file(self.folder / _STAMP, self.peer.wanted.encode())
 
     def _call(self, words: list[str]) -> None:
         own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.pictures.arm_drawing import draw_obstacles, metres
 from models import Obstacle, PlanarArm
+from ocp.internal import replacing
 
 _DPI = 80
 _LAST = 12  # frames that the last posture stays
@@ -67,5 +68,6 @@ def animate(
 
     file.parent.mkdir(parents=True, exist_ok=True)
     film = FuncAnimation(figure, draw, frames=count + _LAST, blit=False)
-    film.save(str(file), writer=PillowWriter(fps=frames_per_second), dpi=_DPI)
+    with replacing(file) as draft:
+        film.save(str(draft), writer=PillowWriter(fps=frames_per_second), dpi=_DPI)
     return file

@@ -11,6 +11,7 @@ from benchmarks.cases import arm_scenario
 from benchmarks.pictures.arm_drawing import draw_obstacles, draw_postures, metres
 from models import ArmScenario
 from ocp import Solution, evaluate, solve
+from ocp.internal import replacing
 from solvers import FixedStep, IndirectShooting, MultipleShooting, Schuetz, polish
 
 _POSTURES = 9
@@ -47,7 +48,8 @@ def bench_picture(case: str, out: Path) -> Path:
     figure.suptitle(f"{name}: a redundant arm follows a line past an obstacle")
     out.mkdir(parents=True, exist_ok=True)
     file = out / f"{case}.png"
-    figure.savefig(file, dpi=130)
+    with replacing(file) as draft:
+        figure.savefig(draft, dpi=130)
     return file
 
 

@@ -11,6 +11,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
+from ocp.internal import replacing
+
 _ROOT = Path(__file__).parents[2]
 # The packages from the top down, with how dark their rooms are.
 _PACKAGES = (("benchmarks", 0.12), ("solvers", 0.22), ("ocp", 0.32))
@@ -67,7 +69,8 @@ def rooms_picture(out: Path) -> Path:
         _draw(axes, package, _rooms_of(package), height, shade)
     out.mkdir(parents=True, exist_ok=True)
     file = out / "rooms.png"
-    picture.savefig(file, dpi=100)
+    with replacing(file) as draft:
+        picture.savefig(draft, dpi=100)
     return file
 
 

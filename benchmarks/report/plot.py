@@ -79,7 +79,7 @@ def drawn(name: str, height: float, draw: Callable[[Axes], None]) -> str:
     """Return a drawing as an SVG element without a single address or fixed colour.
 
     Args:
-        name: unique on the page; its ids begin with it.
+        name: unique on the page, without two hyphens in a row; its ids begin with it and these.
         height: [inches].
         draw: draws onto empty axes.
     """
@@ -128,9 +128,10 @@ def power_of_ten(value: float) -> str:
 
 
 def named_ticks(axis: Axis, names: Sequence[str]) -> None:
-    """Give the ticks 0, 1, ... names."""
+    """Give the ticks 0, 1, ... names; characters that control something are not drawn."""
+    shown = ["".join(c if c.isprintable() else "\ufffd" for c in name) for name in names]
     axis.set_major_locator(FixedLocator(range(len(names))))
-    axis.set_major_formatter(FixedFormatter(names))
+    axis.set_major_formatter(FixedFormatter(shown))
     axis.set_minor_locator(NullLocator())
 
 
@@ -142,8 +143,8 @@ def _fitted(svg: str, name: str) -> str:
     )
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'<g id="series-(\d+)">', r'<g class="series" data-series="\1">', svg)
-    svg = svg.replace("xlink:href", "href")
-    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = svg.replace("xlink:href", "href").replace('id="matplotlib.', 'id="')
+    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}--", svg)
     svg = re.sub(r"font: ([\d.]+px) [^;\"]*", r"font: \1 var(--font)", svg)
     svg = svg.replace(TEXT, "currentColor").replace(_GRID, "var(--grid)")
     return re.sub(r"#0a5e([0-9a-f]{2})", lambda found: f"var(--s{int(found[1], 16)})", svg)

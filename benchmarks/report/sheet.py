@@ -9,6 +9,9 @@ from urllib.parse import quote
 
 Cell = str | int | float | bool | None
 
+# A spreadsheet takes text that begins so for a formula, also in full width, unless it is a number.
+_FORMULA = re.compile(r"\s*[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 # What a page shows of a long table; its file has everything.
 SHOWN = 200
 
@@ -55,17 +58,24 @@ class Sheet:
 
     @property
     def csv(self) -> str:
-        """The table with all digits, as comma-separated values."""
+        """The table with all digits, as comma-separated values, none of which is a formula."""
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.columns)
-        writer.writerows(self.lines)
+        # What stands in the end of a line is quoted in cells: a bare CR would begin a line too.
+        writer = csv.writer(text, lineterminator="\r\n")
+        writer.writerows([*map(_inert, line)] for line in (self.columns, *self.lines))
         return text.getvalue()
 
     @property
     def address(self) -> str:
         """The file as an address that needs no network."""
         return "data:text/csv;charset=utf-8," + quote(self.csv)
+
+
+def _inert(cell: Cell) -> Cell:
+    """Return a cell as a spreadsheet shows it, text behind an apostrophe where it would compute."""
+    if isinstance(cell, str) and _FORMULA.match(cell) and not _NUMBER.fullmatch(cell):
+        return f"'{cell}"
+    return cell
 
 
 def is_number(cell: Cell) -> bool:

@@ -1,22 +1,23 @@
 """One result, one JSON object, one line."""
 
-import json
 import os
 import platform
 import re
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from types import UnionType
-from typing import get_args, get_origin, get_type_hints
+from typing import get_type_hints
 
 import numpy as np
 
 from benchmarks.cases import Case
 from benchmarks.methods.method import Method, Outcome, Settings
+from benchmarks.sweep.json_line import check_types, entry_of, line_of
 from benchmarks.sweep.task import Key, SweepTask, key_of
+from ocp.internal import append_line
 
 RESULTS = "results.jsonl"
 # A row counts as solved if its method says so and the referee finds no larger violation.
@@ -85,7 +86,7 @@ class Row:
             starts=settings.starts,
             seed=settings.seed,
             status=solution.status.name,
-            message=solution.message,
+            message=_text(solution.message),
             solved=solved,
             optimum=None if gap is None else solved and abs(gap) <= SAME_OPTIMUM,
             cost=_finite(verdict.cost),
@@ -123,7 +124,7 @@ class Row:
             starts=task.settings.starts,
             seed=task.settings.seed,
             status=status,
-            message=message,
+            message=_text(message),
             solved=False,
             optimum=None,
             cost=None,
@@ -158,12 +159,7 @@ class Row:
             ValueError: if it is no row, saying why.
             OtherVersion: if it is one of another version of the format.
         """
-        try:
-            entry = json.loads(line, parse_constant=_no_number)
-        except RecursionError as deep:
-            raise ValueError("nested too deeply") from deep
-        if not isinstance(entry, dict):
-            raise ValueError(f"a {type(entry).__name__}, no object")
+        entry = entry_of(line)
         names = {field.name for field in fields(cls)}
         wrong = [f"no {name}" for name in sorted(names - entry.keys())]
         wrong += [f"an unknown {name}" for name in sorted(entry.keys() - names)]
@@ -171,14 +167,12 @@ class Row:
             raise OtherVersion(f"it has {', '.join(wrong)}")
         if wrong:
             raise ValueError(f"it has {', '.join(wrong[:3])}{' ...' * (len(wrong) > 3)}")
-        for name, hint in _hints().items():
-            if not _fits(entry[name], hint):
-                raise ValueError(f"its {name} is {entry[name]!r}")
+        check_types(entry, _hints())
         return cls(**entry)
 
     def line(self) -> str:
         """Return the row as it is written."""
-        return json.dumps(asdict(self), allow_nan=False) + "\n"
+        return line_of(self)
 
     @property
     def key(self) -> Key:
@@ -197,21 +191,16 @@ class Row:
         return self.status in LOST
 
     def append_to(self, file: Path) -> None:
-        """Write the row in one piece, so that a killed run cannot tear an older one."""
-        descriptor = os.open(file, os.O_APPEND | os.O_CREAT | os.O_WRONLY)
-        try:
-            os.write(descriptor, self.line().encode())
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        """Write the row as a whole and bring it to the disk; an older one cannot be torn by it.
+
+        Raises:
+            OSError: if it cannot be written; the file is as it was.
+        """
+        append_line(file, self.line().encode())
 
 
 class OtherVersion(ValueError):
     """A row that another version of the benchmarks has written."""
-
-
-def _no_number(text: str) -> float:
-    raise ValueError(f"{text} is no number")
 
 
 @cache
@@ -219,15 +208,9 @@ def _hints() -> dict[str, type | UnionType]:
     return get_type_hints(Row)
 
 
-def _fits(value: object, hint: type | UnionType) -> bool:
-    """Whether a value that JSON knows is what a field of a row wants."""
-    if isinstance(hint, UnionType):
-        return any(_fits(value, one) for one in get_args(hint))
-    if get_origin(hint) is dict:
-        return isinstance(value, dict) and all(isinstance(entry, str) for entry in value.values())
-    if hint is float:
-        return isinstance(value, int | float) and not isinstance(value, bool)
-    return isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
+def _text(said: str) -> str:
+    """Return what can be written: names of files may have bytes that are no text."""
+    return said.encode(errors="replace").decode()
 
 
 def _finite(value: float | None) -> float | None:

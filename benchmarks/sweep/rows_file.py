@@ -7,6 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from benchmarks.sweep.row import OtherVersion, Row, versions
+from ocp.internal import append_line, write_file
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,7 @@ def read_rows(file: Path) -> tuple[Row, ...]:
 def mend(file: Path) -> None:
     """End a torn last line, so that the next row starts on a line of its own."""
     if file.exists() and file.stat().st_size and not file.read_bytes().endswith(b"\n"):
-        with file.open("ab") as end:
-            end.write(b"\n")
+        append_line(file, b"")
 
 
 def prepare(file: Path) -> list[str]:
@@ -93,10 +93,5 @@ def _set_aside(file: Path, rows: tuple[Row, ...]) -> Path:
     names = (file.with_name(f"{file.stem}-old-{i}{file.suffix}") for i in count(1))
     kept = next(name for name in names if not name.exists())
     os.link(file, kept)
-    fresh = file.with_suffix(".new")
-    fresh.unlink(missing_ok=True)
-    fresh.touch()
-    for row in rows:
-        row.append_to(fresh)
-    os.replace(fresh, file)
+    write_file(file, "".join(row.line() for row in rows).encode())
     return kept

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from benchmarks.sweep.error import SweepError
 from benchmarks.sweep.executors import Execution
 from benchmarks.sweep.guard import Group
 from benchmarks.sweep.lock import locked
@@ -39,8 +40,8 @@ def sweep(
         say: is called with a sentence about everything in the folder that cannot be used.
 
     Raises:
-        SweepError: if there are no workers, or they went away, the rows so far are kept; or if
-            another sweep writes to the folder.
+        SweepError: if there are no workers, or they went away, or a row cannot be written, the
+            rows so far are kept; or if another sweep writes to the folder.
     """
     out.mkdir(parents=True, exist_ok=True)
     file, wanted = out / RESULTS, {task.key: task for task in tasks}
@@ -74,11 +75,18 @@ def _compute(
     others = set()
     with closing(execution.rows(groups)) as rows:
         for row in rows:
-            row.append_to(file)
+            _write(row, file)
             advance()
             others |= {str(row.versions)} if row.versions != versions() else set()
     for other in sorted(others):
         say(f"workers with other versions have computed rows: {other}; here {versions()}")
+
+
+def _write(row: Row, file: Path) -> None:
+    try:
+        row.append_to(file)
+    except OSError as reason:
+        raise SweepError(f"{file} cannot be written: {reason.strerror}") from reason
 
 
 def _bar(visible: bool) -> Progress:

@@ -1,4 +1,4 @@
-"""The exceptions of the toolkit: one root, three kinds."""
+"""The exceptions of the toolkit: one root, three kinds, and files."""
 
 
 class OCPError(Exception):
@@ -7,6 +7,13 @@ class OCPError(Exception):
 
 class ProblemError(OCPError, ValueError):
     """A description or an input is wrong; the message names symbol, shape and stage."""
+
+
+class DamagedFile(ProblemError):
+    """A file is not what it should be, or not as it was written.
+
+    The message names the file, the place, and what can still be read of it, and how.
+    """
 
 
 class UnsupportedProblem(OCPError, TypeError):

@@ -1,6 +1,7 @@
 """The record of a closed loop."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,10 @@ import numpy as np
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.closed_loop.decision import Decision, InputSource
+from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.loop_plotting.loop_record import Draw, Progress
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.ocp import OCP
-from ocp.solution.archive import read_archive, write_archive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,7 +160,13 @@ class Rollout:
         )
 
     def save(self, path: str | Path) -> Path:
-        """Write everything but the plant and the plans to one ``.npz`` file; return its path."""
+        """Write everything but the plant and the plans to one ``.npz`` file; return its path.
+
+        A file of that name is replaced when the new one is whole and on the disk.
+
+        Raises:
+            ProblemError: if it cannot be written; a file that was there is as it was.
+        """
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             "outcomes": np.array([source.name for source in self.sources], dtype=str),
@@ -174,22 +181,32 @@ class Rollout:
         """Read a rollout of ``plant`` from a file that ``save`` wrote.
 
         Raises:
-            ProblemError: if the file belongs to another plant, by its name or by what its
-                functions and bounds are, or is no rollout.
+            ProblemError: if the file cannot be read, or belongs to another plant, by its name or
+                by what its functions and bounds are.
+            DamagedFile: if it is no rollout, or not as it was saved (older files have no
+                checksum); ``whole_arrays`` reads what is left of it.
         """
         check_instance(plant, OCP, f"the plant that {path} is to be a loop with")
         needed = {"outcomes", "messages", "plant", *_ARRAYS, *_SCALARS}
         data = read_archive(path, "rollout", needed)
         if str(data["plant"]) != plant.name:
             raise ProblemError(f"{path} is a loop with '{data['plant']}', not '{plant.name}'")
-        if other := differing_in(data, plant):
+        with made_of(path, "rollout"):
+            other = differing_in(data, plant)
+        if other:
             raise ProblemError(f"{path} is a loop with another '{plant.name}': {', '.join(other)}")
+        with made_of(path, "rollout"):
+            return cls._of(data, plant)
+
+    @classmethod
+    def _of(cls, data: Mapping[str, np.ndarray], plant: OCP) -> "Rollout":
+        """Return the rollout of an archive."""
         names = _names_of(data["outcomes"])
         if not set(names) <= set(InputSource.__members__):
-            raise ProblemError(f"{path} is no saved rollout: a source is none of the five")
+            raise ProblemError("a source is none of the five")
         return cls(
             plant=plant,
-            **{name: data[name] for name in _ARRAYS},
+            **{name: np.asarray(data[name], dtype=float) for name in _ARRAYS},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
             sources=tuple(InputSource[name] for name in names),
             messages=tuple(map(str, data["messages"])),

@@ -4,7 +4,6 @@ import os
 import platform
 import shlex
 import shutil
-import subprocess
 import sys
 import warnings
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 import casadi as ca
@@ -21,6 +19,9 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError
+from ocp.codegen.kept_library import keep_library, kept_library
+from ocp.codegen.run_limited import run_limited
+from ocp.files.draft import draft_folder
 
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 # The name that the generated C gives itself; the content of a library must not depend on its file.
@@ -31,6 +32,8 @@ _FLAGS = ("-O3", "-march=native", "-fno-tree-slp-vectorize")
 # By how much machine code may differ from the interpreted function, relative to 1 + abs(value):
 # far more than rounding, far less than a wrong instruction.
 _SAME = 1e-6
+# So long a compiler may take to say its version [s].
+_ANSWER = 30.0
 # Inputs at which the two are compared.
 _PROBES = 3
 
@@ -54,21 +57,24 @@ class Compiler:
             where it is set).
         optimised: up to so many characters of C. Beyond, a compiler would optimise for minutes,
             and ``-O0`` is added to the flags: still several times faster than interpreted.
+        time_limit: of one build [s]; then the compiler is ended with all it has started.
     """
 
     command: str | None = None
     flags: tuple[str, ...] = _FLAGS
     cache: Path | None = None
     optimised: int = 800_000
+    time_limit: float = 300.0
 
     @property
     def found(self) -> list[str]:
         """The command as a list; empty where there is none."""
         wanted = self.command or os.environ.get("CC", "")
         candidates = [wanted] if wanted else ["cc", "gcc", "clang"]
-        for words in map(shlex.split, candidates):
-            if words and shutil.which(words[0]):
-                return words
+        with suppress(ValueError):  # a quotation without its end
+            for words in map(shlex.split, candidates):
+                if words and shutil.which(words[0]):
+                    return words
         return []
 
     def words(self, code: str) -> list[str]:
@@ -79,7 +85,11 @@ class Compiler:
 
     @property
     def folder(self) -> Path:
-        """Where the libraries are kept."""
+        """Where the libraries are kept.
+
+        Raises:
+            FileNotFoundError: if the user has no home folder, and none is given otherwise.
+        """
         return self.cache or _user_cache() / "ocp-toolkit"
 
 
@@ -88,11 +98,12 @@ def compiled(
 ) -> ca.Function:
     """Return a function as machine code, with the same inputs and outputs.
 
-    The library is kept under a name made from the generated C, compiler, flags and processor:
-    what was built once is loaded. It is built under a temporary name in the same folder and
-    then renamed, so that two processes may build at once. What was loaded is compared with the
-    interpreted function at a few inputs, since compilers make mistakes. Where it cannot be built
-    or kept, or gives other numbers, the interpreted function comes back, and
+    The library is kept under a name made from the generated C, compiler, flags and processor,
+    and from its own content: what was built once is loaded, if it still is what was built and
+    nobody else could have changed it, else it is built again. It is built in a folder of its own
+    and then renamed, so that two processes may build at once. What was loaded is compared with
+    the interpreted function at a few inputs, since compilers make mistakes. Where it cannot be
+    built in time, or kept, or gives other numbers, the interpreted function comes back, and
     ``InterpretedWarning`` says why, once per reason.
 
     Meant for functions of the size of one stage; map them afterwards. A whole transcribed
@@ -185,50 +196,57 @@ def _tidied(function: ca.Function, options: dict | None = None) -> ca.Function:
 
 
 def _library(code: str, compiler: Compiler) -> Path:
-    """Return the library of some C code, built unless it is there."""
+    """Return the library of some C code, built unless it is there as it was built."""
     words = compiler.words(code)
     if not words:
-        raise _Unbuildable(
-            f"there is no compiler '{compiler.command or os.environ.get('CC') or 'cc'}'"
-        )
-    what = [code, *words, _version(tuple(compiler.found)), _processor()]
-    key = sha256("\0".join(what).encode()).hexdigest()
-    library = compiler.folder / f"{key[:32]}{_SUFFIX}"
-    if not library.exists():
-        try:
-            compiler.folder.mkdir(parents=True, exist_ok=True)
-            _build(code, words, library)
-        except OSError as error:
-            raise _Unbuildable(f"{compiler.folder} cannot be written ({error})") from error
-    return library
-
-
-def _build(code: str, command: list[str], library: Path) -> None:
-    """Build a library under a name of its own, then give it its name in one step."""
-    with NamedTemporaryFile(
-        "w", suffix=".c", dir=library.parent, delete=False, encoding="utf-8"
-    ) as source:
-        source.write(code)
-    c_file = Path(source.name)
-    built = c_file.with_suffix(_SUFFIX)
-    words = [*command, "-shared", "-fPIC", str(c_file), "-o", str(built), "-lm"]
+        raise _Unbuildable(_no_compiler(compiler))
+    version = _version(tuple(compiler.found), min(_ANSWER, compiler.time_limit))
+    if version is None:
+        raise _Unbuildable(f"{shlex.join(compiler.found)} --version does not answer")
+    key = sha256("\0".join([code, *words, version, _processor()]).encode()).hexdigest()[:32]
     try:
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        if done.returncode != 0 or not built.exists():
-            lines = (done.stderr or done.stdout).strip().splitlines() or ["without a word"]
+        folder = compiler.folder.absolute()
+        folder.mkdir(0o700, parents=True, exist_ok=True)
+        return kept_library(folder, key, _SUFFIX) or _build(code, words, compiler, folder / key)
+    except OSError as error:
+        raise _Unbuildable(f"the cache cannot be written ({error})") from error
+
+
+def _no_compiler(compiler: Compiler) -> str:
+    wanted = compiler.command or os.environ.get("CC") or "cc"
+    try:
+        shlex.split(wanted)
+    except ValueError as error:
+        return f"the compiler '{wanted}' cannot be split into words ({error})"
+    return f"there is no compiler '{wanted}'"
+
+
+def _build(code: str, command: list[str], compiler: Compiler, stem: Path) -> Path:
+    """Build a library in a folder of its own, and keep it when it is whole."""
+    with draft_folder(stem.parent) as folder:
+        source, built = folder / f"{_UNIT}.c", folder / f"{_UNIT}{_SUFFIX}"
+        source.write_text(code, encoding="utf-8")
+        words = [*command, "-shared", "-fPIC", str(source), "-o", str(built), "-lm"]
+        try:
+            end, said = run_limited(words, compiler.time_limit, folder)
+        except (OSError, ValueError) as error:
+            raise _Unbuildable(f"{shlex.join(command)} cannot be started ({error})") from error
+        if end is None:
+            limit = f"{compiler.time_limit:g} s"
+            raise _Unbuildable(f"{shlex.join(command)} did not end within {limit}")
+        if end != 0 or not built.exists():
+            lines = said.strip().splitlines() or ["without a word"]
+            if end < 0:
+                lines = [f"it was ended by signal {-end}"]
             raise _Unbuildable(f"{shlex.join(command)} failed: {lines[0][:200]}")
-        built.replace(library)
-    finally:
-        for left in (c_file, built):
-            with suppress(OSError):
-                left.unlink(missing_ok=True)
+        return keep_library(built, stem)
 
 
 def _loaded(name: str, library: Path, options: dict) -> ca.Function:
     try:
         return ca.external(name, str(library), options)
     except RuntimeError as error:  # what CasADi raises where the library cannot be opened
-        raise _Unbuildable(f"{library} cannot be loaded; remove it") from error
+        raise _Unbuildable(f"{library}, which was built so, cannot be loaded") from error
 
 
 def _user_cache() -> Path:
@@ -236,17 +254,21 @@ def _user_cache() -> Path:
         return Path(os.environ["XDG_CACHE_HOME"])
     if sys.platform == "win32" and os.environ.get("LOCALAPPDATA"):
         return Path(os.environ["LOCALAPPDATA"])
-    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+    try:
+        home = Path.home()
+    except RuntimeError as error:
+        raise FileNotFoundError("there is no home folder: set XDG_CACHE_HOME") from error
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
 
 
 @cache
-def _version(command: tuple[str, ...]) -> str:
-    """What a compiler says about itself."""
+def _version(command: tuple[str, ...], limit: float) -> str | None:
+    """What a compiler says about itself; None: nothing, for so long [s]."""
     try:
-        words = [*command, "--version"]
-        return subprocess.run(words, capture_output=True, text=True, check=False).stdout
-    except OSError:
+        end, said = run_limited([*command, "--version"], limit)
+    except (OSError, ValueError):
         return ""
+    return None if end is None else said
 
 
 @cache

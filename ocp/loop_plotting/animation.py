@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from ocp.checks.arguments import check_callable, check_instance, check_positive, check_whole
 from ocp.checks.errors import ProblemError
+from ocp.files.draft import replacing
 from ocp.loop_plotting.loop_record import Draw, LoopRecord, PlannedInput, Progress
 from ocp.loop_plotting.rollout import COLOURS, labels, refuse_empty
 from ocp.solution.shifted_plan import plan_controls
@@ -49,7 +50,7 @@ def animate_rollout(
     film.figure.set_layout_engine(None)  # from here on the axes stay where they are
     path.parent.mkdir(parents=True, exist_ok=True)
     writer = PillowWriter(fps=frames_per_second)
-    with writer.saving(film.figure, str(path), _DPI):
+    with replacing(path) as draft, writer.saving(film.figure, str(draft), _DPI):
         for k, t in enumerate(times):
             film.show(float(t))
             writer.grab_frame()

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +12,13 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError
 from ocp.closed_loop.decision import ControlRefused, Decision, InputSource
+from ocp.files.append import append, sync
+from ocp.files.archive import named
+from ocp.files.draft import write_file
+from ocp.files.frame import framed
 from ocp.mpc.mpc import MPC
-from ocp.mpc.record_format import Record, header, packed, read_header, records
-from ocp.solution.archive import opened
+from ocp.mpc.record_file import Header, read_header, records
+from ocp.mpc.record_format import Record, packed
 from ocp.solution.solution import Solution
 
 
@@ -23,13 +27,15 @@ class FlightRecorder:
 
     The file begins with a line of JSON that says whose it is. A record is a head of fixed size,
     the shapes of its arrays, these as doubles (what was measured, the input, the step's new
-    plan if there is one, the parameters), and the message. A record that was cut off by a
-    crash is ignored later. Use it as a context manager and give its ``watch`` to the loop. A record
-    begins with a controller that knows nothing yet: a loop resets it; else call ``reset``.
+    plan if there is one, the parameters), and the message; it has a number and a checksum. What
+    was watched can be read again whenever the process ends; a failure of power may cost the
+    last seconds, since only closing waits for the disk. Use it as a context manager and give its
+    ``watch`` to the loop. A record begins with a controller that knows nothing yet: a loop
+    resets it; else call ``reset``.
 
     Args:
         mpc: whose steps are recorded.
-        path: the file, overwritten.
+        path: the file; an earlier one is replaced at the first step.
 
     Raises:
         ProblemError: if the file cannot be written.
@@ -40,8 +46,9 @@ class FlightRecorder:
         check_instance(mpc, MPC, "flight recorder: mpc")
         check_instance(path, (str, Path), "the path of a flight record")
         self._mpc, self.path = mpc, Path(path)
-        self._file: BinaryIO = opened(path, "wb", "flight record")
-        self._begun, self._t = False, -np.inf
+        with named(path, "flight record", "written"):
+            self._file = self.path.open("ab", buffering=0)
+        self._begun, self._number, self._t = False, 0, -np.inf
 
     def __enter__(self) -> Self:
         """Return the recorder."""
@@ -53,31 +60,38 @@ class FlightRecorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close the file."""
-        self._file.close()
+        """Bring the file to the disk and close it."""
+        with self._file:
+            sync(self._file.fileno())
 
     def watch(self, measured: np.ndarray, decided: Decision | ControlRefused) -> None:
         """Write down a step of the controller that has just decided, or refused.
 
         Raises:
             ProblemError: if it is a step of another run, or of a controller that is no ``MPC``.
+            OSError: if it cannot be written (a full disk). The file ends with the step before, and
+                goes on with the next one that can be written; ``records`` says which are missing.
         """
         step = decided.report if isinstance(decided, ControlRefused) else decided
         if step is None:
             raise ProblemError(f"{self.path}: a refusal of a controller that is no MPC: {decided}")
-        if not self._begun:
-            self._begin()
         if step.t < self._t:
             raise ProblemError(f"{self.path}: t goes back to {step.t:g} s; a record is of one run")
-        self._t = step.t
-        self._file.write(packed(measured, step))
-        self._file.flush()
+        self._t, number = step.t, self._number
+        self._number += 1
+        if not self._begun:
+            self._begin()
+        append(self._file.fileno(), framed(number, packed(measured, step)))
 
     def _begin(self) -> None:
         """Write the first line: only the loop tells the controller what acts at first."""
-        mpc, self._begun = self._mpc, True
-        names, acting = [entry.name for entry in mpc.ocp.parameters], mpc.state.initial_input
-        self._file.write(header(mpc.ocp.name, repr(mpc.solver), names, acting))
+        mpc, acting = self._mpc, self._mpc.state.initial_input
+        names = tuple(entry.name for entry in mpc.ocp.parameters)
+        said = None if acting is None else acting.tolist()
+        write_file(self.path, Header(mpc.ocp.name, repr(mpc.solver), names, said).line)
+        with self._file:  # of the file that was there
+            self._file = self.path.open("ab", buffering=0)
+        self._begun = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +128,7 @@ def replay(mpc: MPC, path: str | Path, step: int) -> Replay:
 
     Raises:
         ProblemError: if the file is not of this problem and solver, or ends before the step.
+        DamagedFile: if this step or one before it is not as it was written.
     """
     return next(replay_all(mpc, path, [step]))
 
@@ -123,19 +138,20 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
 
     Raises:
         ProblemError: if the file is not of this problem and solver, or ends before a step.
+        DamagedFile: if a step up to the last of them is not as it was written.
     """
     check_instance(mpc, MPC, "replay: mpc")
-    with opened(path, "rb", "flight record") as file:
-        said = read_header(file, path)
-    for name, own in (("problem", mpc.ocp.name), ("solver", repr(mpc.solver))):
-        if said[name] != own:
-            raise ProblemError(f"{path} records the {name} '{said[name]}', not '{own}'")
+    said = read_header(path)
+    for name, kept, own in (
+        ("problem", said.problem, mpc.ocp.name),
+        ("solver", said.solver, repr(mpc.solver)),
+    ):
+        if kept != own:
+            raise ProblemError(f"{path} records the {name} '{kept}', not '{own}'")
     wanted, again = set(steps), replace(mpc, parameters=_unknown)
-    again.reset(said.get("acting"))
+    again.reset(said.acting)
     state = again.state
     for k, record in enumerate(records(path)):
-        if not wanted:
-            return
         # A stateful solver has to run at all the steps before.
         if k in wanted or again.is_stateful:
             again.state = state
@@ -143,6 +159,8 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
             if k in wanted:
                 wanted.remove(k)
                 yield found
+        if not wanted:
+            return
         state = state.after(
             record.input,
             _plan(mpc, record),

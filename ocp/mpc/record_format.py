@@ -1,43 +1,44 @@
 """One step of a controller as bytes, and back."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from struct import Struct, pack
-from typing import Any, BinaryIO, NamedTuple
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from struct import Struct, error, pack
+from typing import NamedTuple, get_args
 
 import numpy as np
 
-from ocp.checks.errors import ProblemError
 from ocp.closed_loop.decision import Decision, InputSource, StepReport
-from ocp.solution.archive import opened
 from ocp.solution.solution import ControlKind
 from ocp.solution.status import Status
 
-_FORMAT = "flight record, version 3"  # the enums below belong to it
 # Bytes that follow; t, residual, clipped, time used; age; source, status, late, informed,
 # kind and status of the plan, number of arrays.
-_HEAD = Struct("<I4di7B")
+HEAD = Struct("<I4di7B")
 _SHAPE = Struct("<2i")
 # Instead of the number of columns: the array has one axis.
 _VECTOR = -1
-# A place in one of these is a byte of the head; the first entry of each: there is none.
-_SOURCES: tuple[InputSource | None, ...] = (
-    None,
-    InputSource.OPTIMAL,
-    InputSource.FEASIBLE,
-    InputSource.SHIFTED,
-    InputSource.BACKUP,
-    InputSource.LEAST_VIOLATING,
-)
-_STATUSES: tuple[Status | None, ...] = (None, *Status)
-_KINDS: tuple[ControlKind | None, ...] = (
-    None,
-    "held",
-    "linear",
-    "polynomial",
-    "extremal",
-)
+
+
+@dataclass(frozen=True)
+class Codes:
+    """What bytes of a head stand for, by their place; the first entry of each: there is none.
+
+    Attributes:
+        sources: names of ``InputSource``.
+        statuses: names of ``Status``.
+        kinds: of control.
+    """
+
+    sources: Sequence[str | None] = (None, *InputSource.__members__)
+    statuses: Sequence[str | None] = (None, *Status.__members__)
+    kinds: Sequence[ControlKind | None] = (None, *get_args(ControlKind))
+
+
+CODES = Codes()
+_SOURCES = {name: code for code, name in enumerate(CODES.sources)}
+_STATUSES = {name: code for code, name in enumerate(CODES.statuses)}
+_KINDS = {name: code for code, name in enumerate(CODES.kinds)}
 
 
 class Plan(NamedTuple):
@@ -97,20 +98,6 @@ class Record(NamedTuple):
         return self.parameters_known and bool(np.isfinite(self.measured).all())
 
 
-def header(
-    problem: str, solver: str, parameters: Sequence[str], acting: np.ndarray | None
-) -> bytes:
-    """Return the first line of a file: whose it is, and what acted before the first decision."""
-    said = {
-        "format": _FORMAT,
-        "problem": problem,
-        "solver": solver,
-        "parameters": [*parameters],
-        "acting": None if acting is None else acting.tolist(),
-    }
-    return json.dumps(said).encode() + b"\n"
-
-
 def packed(measured: np.ndarray, step: StepReport) -> bytes:
     """Return a step, with its measurement and new plan, as bytes."""
     plan = step.new_plan
@@ -129,58 +116,53 @@ def packed(measured: np.ndarray, step: StepReport) -> bytes:
     # As many as len(arrays) times _SHAPE, at once.
     shapes = pack(f"<{len(sizes)}i", *sizes)
     message = step.message.encode()
-    head = _HEAD.pack(
+    head = HEAD.pack(
         len(shapes) + sum([array.nbytes for array in arrays]) + len(message),
         step.t,
         step.residual,
         decision.clipped if decision else 0.0,
         step.time_used,
         decision.age if decision else 0,
-        _SOURCES.index(decision.source if decision else None),
-        _STATUSES.index(step.status),
+        _SOURCES[decision.source.name if decision else None],
+        _STATUSES[step.status.name if step.status else None],
         step.late,
         step.parameters_known,
-        _KINDS.index(plan.control_kind if plan else None),
-        _STATUSES.index(plan.status if plan else None),
+        _KINDS[plan.control_kind if plan else None],
+        _STATUSES[plan.status.name if plan else None],
         len(arrays),
     )
     # Before Python 3.12 a type checker does not know that arrays are buffers.
     return b"".join([head, shapes, *arrays, message])  # pyright: ignore[reportArgumentType]
 
 
-def read_header(file: BinaryIO, path: str | Path) -> dict[str, Any]:
-    """Return what the first line says.
+def size_of(head: bytes) -> int:
+    """Return how many bytes of a record follow its first ``HEAD`` bytes."""
+    return HEAD.unpack(head)[0]
+
+
+def unpacked(record: bytes, names: Sequence[str] | None, codes: Codes) -> Record:
+    """Return a step from its bytes.
+
+    Args:
+        record: as ``packed`` made it.
+        names: of the parameters; None: they are called "0", "1", ...
+        codes: what its codes stand for.
 
     Raises:
-        ProblemError: if it is none of a flight record.
+        ValueError: if these are the bytes of no step.
     """
     try:
-        said = json.loads(file.readline())
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ProblemError(f"{path} is no flight record") from error
-    if not isinstance(said, dict) or said.get("format") != _FORMAT:
-        raise ProblemError(f"{path} is no {_FORMAT}")
-    return said
+        return _unpacked(record, names, codes)
+    except (LookupError, TypeError, StopIteration, error) as reason:
+        raise ValueError(f"these bytes are no step ({reason!r})") from reason
 
 
-def records(path: str | Path) -> Iterator[Record]:
-    """Yield the complete records of a file, in order.
-
-    Raises:
-        ProblemError: if it is no flight record.
-    """
-    with opened(path, "rb", "flight record") as file:
-        names = read_header(file, path)["parameters"]
-        while (head := file.read(_HEAD.size)) and len(head) == _HEAD.size:
-            body = file.read(_HEAD.unpack(head)[0])
-            if len(body) < _HEAD.unpack(head)[0]:
-                return
-            yield _unpacked(head, body, names)
-
-
-def _unpacked(head: bytes, body: bytes, names: Sequence[str]) -> Record:
-    (_, t, residual, clipped, time_used, age, source, status, late, informed, kind, made, count
-     ) = _HEAD.unpack(head)  # fmt: skip
+def _unpacked(record: bytes, names: Sequence[str] | None, codes: Codes) -> Record:
+    (follow, t, residual, clipped, time_used, age, source, status, late, informed, kind, made, count
+     ) = HEAD.unpack_from(record)  # fmt: skip
+    body = record[HEAD.size :]
+    if len(body) != follow:
+        raise ValueError(f"there are {len(body)} bytes, there should be {follow}")
     arrays, end = _arrays(body, count)
     rest = iter(arrays)
     measured = next(rest)
@@ -188,15 +170,16 @@ def _unpacked(head: bytes, body: bytes, names: Sequence[str]) -> Record:
     plan = None
     if kind:
         own = [next(rest) for _ in _ARRAYS]
-        plan = Plan(_KINDS[kind], _STATUSES[made], *own)  # pyright: ignore[reportArgumentType]
+        plan = Plan(codes.kinds[kind], Status[codes.statuses[made]], *own)  # pyright: ignore[reportArgumentType]
+    known = list(rest)
     return Record(
         t=t,
-        source=_SOURCES[source],
-        status=_STATUSES[status],
+        source=InputSource[codes.sources[source]] if source else None,  # pyright: ignore[reportArgumentType]
+        status=Status[codes.statuses[status]] if status else None,  # pyright: ignore[reportArgumentType]
         message=body[end:].decode(),
         measured=measured,
         input=sent,
-        parameters=dict(zip(names, rest, strict=bool(informed))),
+        parameters=dict(zip(names or map(str, range(len(known))), known, strict=bool(informed))),
         plan=plan,
         late=bool(late),
         parameters_known=bool(informed),
@@ -211,8 +194,10 @@ def _arrays(body: bytes, count: int) -> tuple[list[np.ndarray], int]:
     """Return the arrays at the beginning, and where they end."""
     at, found = count * _SHAPE.size, []
     for rows, columns in _SHAPE.iter_unpack(body[:at]):
+        if rows < 0 or columns < _VECTOR:
+            raise ValueError(f"an array has shape ({rows}, {columns})")
         shape = (rows,) if columns == _VECTOR else (rows, columns)
-        size = int(np.prod(shape))
+        size = math.prod(shape)
         found.append(np.frombuffer(body, count=size, offset=at).reshape(shape))
         at += 8 * size
     return found, at

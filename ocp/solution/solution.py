@@ -12,13 +12,13 @@ from scipy.interpolate import PPoly
 
 from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
-from ocp.solution.archive import read_archive, write_archive
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.status import Status
 
@@ -285,7 +285,13 @@ class Solution:
         return plot_solution(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything to one ``.npz`` file, the problem as its ``probe``; return its path."""
+        """Write everything to one ``.npz`` file, the problem as its ``probe``; return its path.
+
+        A file of that name is replaced when the new one is whole and on the disk.
+
+        Raises:
+            ProblemError: if it cannot be written; a file that was there is as it was.
+        """
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             f"{group}/{key}": value
@@ -303,9 +309,10 @@ class Solution:
         """Read a solution of ``problem`` from a file that ``save`` wrote.
 
         Raises:
-            ProblemError: if the file belongs to another problem, by its name or by what the
-                problem's functions and bounds are (older files know only the name), or
-                is no solution.
+            ProblemError: if the file cannot be read, or belongs to another problem, by its name or
+                by what the problem's functions and bounds are (older files know only the name).
+            DamagedFile: if it is no solution, or not as it was saved (older files have no
+                checksum); ``whole_arrays`` reads what is left of it.
         """
         check_instance(problem, OCP, f"the problem that {path} is to be a solution of")
         needed = {"status", "problem", *_ARRAYS, *_SCALARS}
@@ -313,15 +320,23 @@ class Solution:
         data.setdefault("breaks", np.empty(0, dtype=int))  # files of before there were any
         if str(data["problem"]) != problem.name:
             raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
+        with made_of(path, "solution"):
+            other = differing_in(data, problem)
+        if other:
+            raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
+        with made_of(path, "solution"):
+            return cls._of(data, problem)
+
+    @classmethod
+    def _of(cls, data: Mapping[str, np.ndarray], problem: OCP) -> "Solution":
+        """Return the solution of an archive."""
         groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}, "probe": {}}
         for name, value in data.items():
             group, _, key = name.partition("/")
             if key:
                 groups[group][key] = value
-        if other := differing_in(data, problem):
-            raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
         if str(data["status"]) not in Status.__members__:
-            raise ProblemError(f"{path} is no saved solution: its status is '{data['status']}'")
+            raise ProblemError(f"its status is '{data['status']}'")
         return cls(
             problem=problem,
             status=Status[str(data["status"])],

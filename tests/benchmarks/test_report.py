@@ -18,6 +18,7 @@ from benchmarks.report.limitations import limitations
 from benchmarks.report.page import SECTIONS
 from benchmarks.report.plot import power_of_ten
 from benchmarks.report.profiles import ratios_to_best
+from benchmarks.report.rows import parts_of
 from benchmarks.report.section import Points
 from benchmarks.report.sheet import SHOWN, Sheet
 from benchmarks.report.success import share
@@ -109,6 +110,75 @@ def test_text_of_rows_stays_text(text):
     assert "&lt;script&gt;alert" in text
     evil = report_page([row(solver=EVIL, case=EVIL, message=EVIL)], [], EVIL)
     assert "<script>alert" not in evil
+
+
+# Names that would leave an attribute, an id, a script, a style, a regular expression or a drawing.
+NAMES = [
+    's"><script>alert(1)</script>',
+    "s' onload='alert(1)",
+    "</script><script>alert(1)</script>",
+    "</style><img src=x onerror=alert(1)>",
+    "]]></svg><script>alert(1)</script>",
+    "--><script>alert(1)</script><!--",
+    "javascript:alert(1)",
+    "{{ 7 * 7 }}{% raw %}",
+    "\\g<1>\\1(",
+    'x" id="success" href="#run',
+    "url(#x) #0a5e01 #010203 xlink:href",
+    "=HYPERLINK(1)",
+    "",
+    "   ",
+    "../../etc/passwd",
+    "a\tb\nc\rd",
+    "ünïcödé",
+]
+WHITELISTED = re.compile(r"[A-Za-z0-9_-]+")
+SCRIPTS = len(Page(report_page([row()], [], "A report")).all("script"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_name_is_more_than_text(name):
+    named = {"suite": name, "case": name, "message": name, "worst": name, "status": name}
+    rows = [row(**named, solver=solver, settings=f"{name}(intervals={n})", intervals=n, gap=0.1 / n,
+                violation=1e-3, machine={name: name}, versions={name: name}, when=name or WHEN)
+            for n, solver in enumerate((name, f"{name} 2"), start=1)]  # fmt: skip
+    text = report_page(rows, [name], "A report")
+    page = Page(text)
+    for tag, attributes in page.tags:
+        assert tag not in ("img", "iframe", "object", "embed", "base", "form")
+        assert not [a for a in attributes if a.startswith("on")], attributes
+        assert WHITELISTED.fullmatch(attributes.get("id") or "x"), attributes
+        assert WHITELISTED.fullmatch((attributes.get("download") or "x").removesuffix(".csv"))
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    addresses = [a["href"] or "" for _, a in page.tags if "href" in a]
+    assert {address.partition(":")[0] for address in addresses if address[0] != "#"} == {"data"}
+    assert {address[1:] for address in addresses if address[0] == "#"} <= set(ids)
+    assert len(page.all("script")) == SCRIPTS
+
+
+def test_suites_that_differ_in_signs_only_have_addresses_of_their_own():
+    rows = [row(suite=name) for name in ("a b", "a-b", "a?b", "a-b-2", "???", "!", "x-figure_1")]
+    names = [part.name for part in parts_of(rows)]
+    assert names == ["a-b", "a-b-2", "a-b-3", "a-b-2-2", "suite", "suite-2", "x-figure-1"]
+    ids = [a["id"] for _, a in Page(report_page(rows, [], "A report")).tags if "id" in a]
+    assert len(ids) == len(set(ids))
+
+
+@pytest.mark.parametrize(
+    ("cell", "written"),
+    [
+        ("=1+1", "'=1+1"), ("+1+1", "'+1+1"), ("-1+1", "'-1+1"), ("@SUM(A1)", "'@SUM(A1)"),
+        ("\t=1", "'\t=1"), ("\r=1", "'\r=1"), ("\n=1", "'\n=1"), (" =1", "' =1"),
+        ("\uff1d1", "'\uff1d1"), ("-", "'-"), ("-inf", "'-inf"), ("-5+cmd|'!A0", "'-5+cmd|'!A0"),
+        ("a=1", "a=1"), ("", ""), ("-5", "-5"), ("+1.5e-3", "+1.5e-3"),
+        (-5, "-5"), (-1.5e-7, "-1.5e-07"), (None, ""), (True, "True"),
+    ],
+)  # fmt: skip
+def test_no_cell_is_a_formula_and_numbers_stay_numbers(cell, written):
+    lines = list(csv.reader(io.StringIO(Sheet("s", ("c", "d"), [(cell, 1.0)]).csv, newline="")))
+    assert lines == [["c", "d"], [written, "1.0"]]
+    assert next(csv.reader([Sheet("s", ("=c",), []).csv])) == ["'=c"]
 
 
 def test_the_page_has_its_own_colours(text):

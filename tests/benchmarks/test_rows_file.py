@@ -8,6 +8,7 @@ from benchmarks.methods.method import Settings
 from benchmarks.sweep.row import CRASHED, RESULTS, OtherVersion, Row
 from benchmarks.sweep.rows_file import mend, prepare, read_found, read_rows
 from benchmarks.sweep.task import SweepTask
+from ocp.internal import with_checksum, without_checksum
 
 
 def lost(case: str) -> Row:
@@ -17,7 +18,9 @@ def lost(case: str) -> Row:
 
 
 def changed(**changes: object) -> str:
-    return json.dumps({**json.loads(lost("changed").line()), **changes}) + "\n"
+    """A line that somebody has written so, with the checksum that belongs to it."""
+    entry = without_checksum(json.loads(lost("changed").line()))
+    return json.dumps(with_checksum({**entry, **changes})) + "\n"
 
 
 @pytest.fixture
@@ -87,7 +90,40 @@ def test_a_second_old_file_gets_another_name(file):
 
 def test_another_format_is_told_from_damage():
     with pytest.raises(OtherVersion, match="no when"):
-        Row.parse(json.dumps({k: v for k, v in json.loads(changed()).items() if k != "when"}))
+        Row.parse(changed_without("when"))
+
+
+def changed_without(name: str) -> str:
+    """A line of a version that had no checksums."""
+    entry = without_checksum(json.loads(changed()))
+    return json.dumps({k: v for k, v in entry.items() if k != name})
+
+
+def test_lines_without_a_checksum_are_rows_of_before(file):
+    with file.open("a") as end:
+        end.write(changed_without("") + "\n")
+    assert [row.case for row in read_rows(file)] == ["one", "changed"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"cost": 10**400}, "its cost is 1000"),
+        ({"suite": "\ud800"}, "its suite is '\\ud800'"),
+        ({"machine": {"\ud800": "here"}}, "its machine is"),
+    ],
+)
+def test_what_no_page_can_show_is_no_row(file, changes, why):
+    with file.open("a") as end:
+        end.write(changed(**changes))
+    ((number, said),) = read_found(file).corrupt
+    assert number == 2
+    assert said.startswith(why)
+
+
+def test_a_message_with_bytes_that_are_no_text_is_written():
+    row = Row.lost(SweepTask("a", "b", "c", "", Settings()), CRASHED, "file \udcff", 1.0)
+    assert Row.parse(row.line()).message == "file ?"
 
 
 def test_nothing_to_read_is_no_row(tmp_path):

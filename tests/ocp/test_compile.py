@@ -1,5 +1,6 @@
 import gc
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -194,14 +195,107 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path):
 
 @needs_compiler
 def test_a_library_that_is_none_is_named(tmp_path):
-    compiler = Compiler(cache=tmp_path, flags=("-O0",))
-    compiled(pendulum(), compiler=compiler)
-    moved = tmp_path / "elsewhere"
-    moved.mkdir()
-    for library in tmp_path.glob("*.*"):
-        (moved / library.name).write_text("not a library")
+    script = compiler_that(tmp_path, 'while [ "$1" != "-o" ]; do shift; done; echo none > "$2"')
     with pytest.warns(InterpretedWarning, match="cannot be loaded"):
-        same = compiled(pendulum(), compiler=Compiler(cache=moved, flags=("-O0",)))
+        same = compiled(pendulum(), compiler=Compiler(script, cache=tmp_path / "cache"))
+    assert_same(pendulum(), same, 0)
+
+
+@needs_compiler
+@pytest.mark.parametrize("damage", ["text", "half", "empty", "other", "link", "writable", "folder"])
+def test_a_library_that_is_not_what_was_built_is_built_again(tmp_path, damage):
+    compiler = Compiler(cache=tmp_path / "cache", flags=("-O0",))
+    compiled(pendulum(), along=("x",), compiler=compiler)
+    (other,) = compiler.folder.iterdir()
+    compiled(pendulum(), compiler=compiler)
+    (library,) = set(compiler.folder.iterdir()) - {other}
+    whole = library.read_bytes()
+    moved = tmp_path / "moved"
+    shutil.move(library, moved)
+    if damage == "link":
+        library.symlink_to(moved)
+    elif damage == "folder":
+        library.mkdir()
+    else:
+        swapped = {"text": b"none", "half": whole[:5000], "empty": b"", "other": other.read_bytes()}
+        library.write_bytes(swapped.get(damage, whole))
+        library.chmod(0o722 if damage == "writable" else 0o700)
+    if damage == "folder":  # which nobody has put there by accident
+        with pytest.warns(InterpretedWarning, match="cannot be written"):
+            compiled(pendulum(), compiler=compiler)
+        return
+    again = compiled(pendulum(), compiler=compiler)
+    assert again.is_a("External")
+    assert_same(pendulum(), again, 0)
+    assert library.read_bytes() == whole
+    assert library.stat().st_mode & 0o777 == 0o700
+    assert not library.is_symlink()
+
+
+@needs_compiler
+def test_a_folder_that_everybody_may_change_is_no_cache(tmp_path):
+    tmp_path.chmod(0o777)
+    with pytest.warns(InterpretedWarning, match="everybody may change the files in"):
+        same = compiled(pendulum(), compiler=Compiler(cache=tmp_path))
+    assert_same(pendulum(), same, 0)
+
+
+def compiler_that(folder: Path, does: str) -> str:
+    """A script that knows its version."""
+    script = folder / "cc"
+    script.write_text(f'#!/bin/sh\n[ "$1" = --version ] && exit 0\n{does}\n')
+    script.chmod(0o755)
+    return str(script)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for the compiler")
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        ("sleep 1000 & sleep 1000", r"did not end within 0\.5 s"),
+        ("kill -SEGV $$", "it was ended by signal 11"),
+        (r"printf '\377\376 broken\n' >&2; exit 1", "failed: .. broken"),
+        (r"printf '\377\376'; exit 0", "failed: .."),
+        ("cat; exit 4", "without a word"),
+    ],
+)
+def test_a_compiler_that_misbehaves_is_ended_and_quoted(tmp_path, does, said):
+    cache, limit = tmp_path / "cache", 0.5 if "sleep" in does else 300.0
+    compiler = Compiler(compiler_that(tmp_path, does), cache=cache, time_limit=limit)
+    with pytest.warns(InterpretedWarning, match=said):
+        same = compiled(pendulum(), compiler=compiler)
+    assert_same(pendulum(), same, 0)
+    assert not list(cache.iterdir()), "nothing half done stays"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for the compiler")
+def test_a_compiler_that_does_not_say_its_version_is_not_waited_for(tmp_path):
+    script = tmp_path / "cc"
+    script.write_text("#!/bin/sh\nsleep 1000\n")
+    script.chmod(0o755)
+    compiler = Compiler(str(script), cache=tmp_path, time_limit=0.2)
+    with pytest.warns(InterpretedWarning, match="--version does not answer"):
+        compiled(pendulum(), compiler=compiler)
+
+
+@pytest.mark.parametrize("command", ['gcc "', "gcc 'x", "\\", '""'])
+def test_a_command_that_is_none_is_named(monkeypatch, command):
+    monkeypatch.setenv("CC", command)
+    assert Compiler().found == []
+    with pytest.warns(InterpretedWarning, match="compiler") as warned:
+        compiled(pendulum())
+    assert command in str(warned[0].message)
+
+
+@needs_compiler
+def test_a_user_without_a_home_is_told_so(monkeypatch):
+    def homeless(*_args: object) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    with pytest.warns(InterpretedWarning, match="there is no home folder: set XDG_CACHE_HOME"):
+        same = compiled(pendulum())
     assert_same(pendulum(), same, 0)
 
 
