@@ -19,6 +19,7 @@ from ocp.files.frame import framed
 from ocp.mpc.mpc import MPC
 from ocp.mpc.record_file import Header, read_header, records
 from ocp.mpc.record_format import Record, packed
+from ocp.mpc.step_inputs import missing_measurement
 from ocp.solution.solution import Solution
 
 
@@ -161,12 +162,14 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
                 yield found
         if not wanted:
             return
+        missing = missing_measurement(mpc.ocp, record.measured)
+        solver_ran = record.parameters_known and not missing
         state = state.after(
             record.input,
             _plan(mpc, record),
-            solver_ran=record.is_solvable,
+            solver_ran=solver_ran,
             meets_constraints=record.source is not InputSource.LEAST_VIOLATING,
-            solver_raised=record.is_solvable and record.status is None,
+            solver_raised=solver_ran and record.status is None,
         )
     if wanted:
         raise ProblemError(f"{path} has no step {min(wanted)}")

@@ -92,11 +92,6 @@ class Record(NamedTuple):
     age: int
     time_used: float
 
-    @property
-    def is_solvable(self) -> bool:
-        """Whether the solver had what it needs."""
-        return self.parameters_known and bool(np.isfinite(self.measured).all())
-
 
 def packed(measured: np.ndarray, step: StepReport) -> bytes:
     """Return a step, with its measurement and new plan, as bytes."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from math import isfinite
 from typing import NamedTuple
 
@@ -15,6 +14,7 @@ from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import PlantInput
+from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import sizes_of
 
@@ -74,7 +74,7 @@ class InputCollector:
         if start.shape != (nx,):
             raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
         p, unknown = self._horizon_parameters(state, applies_at, given)
-        missing = self._missing(start)
+        missing = missing_measurement(self.ocp, start)
         at_effect = p.at(applies_at)
         if missing:
             start = np.full(nx, np.nan) if plan is None else plan.state(applies_at)
@@ -83,27 +83,6 @@ class InputCollector:
                 start = self._next_state(start, sent, t + k * self.dt, at_effect)
         unsolvable = joined(unknown, missing)
         return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable)
-
-    def _missing(self, measured: np.ndarray) -> str:
-        """Return why a measurement counts as missing; empty where it does not."""
-        values = measured.tolist()
-        if all(
-            [-most <= value <= most for value, most in zip(values, self._plausible, strict=True)]
-        ):
-            return ""
-        if not all(map(isfinite, values)):
-            return "the measurement is not finite"
-        worst = int((np.abs(measured) / self._plausible).argmax())
-        name = self.ocp.model.x_names[worst]
-        return f"the measurement {name} = {values[worst]:.3g} cannot be meant"
-
-    @cached_property
-    def _plausible(self) -> list[float]:
-        """The largest magnitude of each state that is taken for a measurement."""
-        box = self.ocp.state_bounds
-        known = np.abs([self.ocp.start(), np.asarray(box.lower), np.asarray(box.upper)])
-        largest = np.where(np.isfinite(known), known, 0.0).max(axis=0)
-        return (_ABSURD * np.maximum(largest, sizes_of(self.ocp).x)).tolist()
 
     def _horizon_parameters(
         self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
@@ -129,6 +108,27 @@ class InputCollector:
         if self.applied.what == "rate":
             return x + self.dt * given
         return self.check.next_state(x, given, t, p)
+
+
+def missing_measurement(ocp: OCP, measured: np.ndarray) -> str:
+    """Return why a measured state (nx,) counts as missing; empty where it does not."""
+    values, plausible = measured.tolist(), _plausible(ocp)
+    each = zip(values, plausible, strict=True)
+    if all([-most <= value <= most for value, most in each]):
+        return ""
+    if not all(map(isfinite, values)):
+        return "the measurement is not finite"
+    worst = int((np.abs(measured) / plausible).argmax())
+    return f"the measurement {ocp.model.x_names[worst]} = {values[worst]:.3g} cannot be meant"
+
+
+@once_per_problem
+def _plausible(ocp: OCP) -> list[float]:
+    """Return the largest magnitude of each state that is taken for a measurement."""
+    box = ocp.state_bounds
+    known = np.abs([ocp.start(), np.asarray(box.lower), np.asarray(box.upper)])
+    largest = np.where(np.isfinite(known), known, 0.0).max(axis=0)
+    return (_ABSURD * np.maximum(largest, sizes_of(ocp).x)).tolist()
 
 
 def _told(parameters: Parameters, t: float) -> Mapping[str, ArrayLike]:
