@@ -31,7 +31,12 @@ from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
-from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows, Violation
+from ocp.problem.constraint_rows import (
+    ConstraintRow,
+    ConstraintRows,
+    ImposedRows,
+    Violation,
+)
 from ocp.problem.elastic import elastic
 from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.node_fractions import node_fractions, node_widths
@@ -51,6 +56,7 @@ __all__ = [
     "ConstraintRow",
     "ConstraintRows",
     "Epigraph",
+    "ImposedRows",
     "Jump",
     "LQData",
     "LinearQuadratic",
@@ -59,7 +65,6 @@ __all__ = [
     "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
-    "ProblemRows",
     "RunData",
     "RunResult",
     "ScaledOCP",

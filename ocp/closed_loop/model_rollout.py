@@ -12,7 +12,7 @@ from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.compile import compiled
 from ocp.integration.one_step import RK4, Stage
 from ocp.problem.cache import once_per_problem
-from ocp.problem.constraint_rows import ProblemRows, Violation
+from ocp.problem.constraint_rows import ImposedRows, ProblemRows, Violation
 from ocp.problem.ocp import OCP
 
 # Parameters at the left and at the right end of each interval, (N, n_p) each.
@@ -50,14 +50,14 @@ class ModelRollout:
         n: number of intervals.
         compiled: whether the model runs as machine code.
         control_at_end: whether the last control still acts at the last node.
-        rows: what is checked; default: all rows of the problem.
+        imposed: what is checked; default: all rows of the problem.
     """
 
     ocp: OCP
     n: int
     compiled: bool = False
     control_at_end: bool = False
-    rows: ProblemRows | None = None
+    imposed: ImposedRows | None = None
 
     def of(
         self, x0: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
@@ -80,7 +80,8 @@ class ModelRollout:
         """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
         rows, found = self._rows, [Violation()]
         if rows.states.is_imposed:
-            found.append(rows.states.largest_violation(x[1:], t[1:]))
+            exempt = self._exempt_states[1:]
+            found.append(rows.states.largest_violation(x[1:], t[1:], exempt=exempt))
         if rows.controls.is_imposed:
             found.append(rows.controls.largest_violation(u, t))
         if rows.path.is_imposed:
@@ -99,7 +100,7 @@ class ModelRollout:
 
     @property
     def _rows(self) -> ProblemRows:
-        return self.rows or self.ocp.rows
+        return self.imposed.rows if self.imposed else self.ocp.rows
 
     @cached_property
     def _rollout(self) -> BufferedFunction:
@@ -117,7 +118,20 @@ class ModelRollout:
         exempt = np.zeros((self.n + 1, len(rows)), dtype=bool)
         exempt[0] = ~rows.on_control
         exempt[-1] |= rows.on_control & (not self.control_at_end)
-        return exempt
+        if self.imposed and self.imposed.no_control_rows is not None:
+            exempt |= self.imposed.no_control_rows[:, None] & rows.on_control
+        return exempt | (self._no_state_rows[:, None] & ~rows.on_control)
+
+    @cached_property
+    def _exempt_states(self) -> np.ndarray:
+        """Where bounds of states do not hold, bool (N + 1, nx)."""
+        return np.tile(self._no_state_rows[:, None], self.ocp.model.nx)
+
+    @property
+    def _no_state_rows(self) -> np.ndarray:
+        if self.imposed is None or self.imposed.no_state_rows is None:
+            return np.zeros(self.n + 1, dtype=bool)
+        return self.imposed.no_state_rows
 
 
 @once_per_problem

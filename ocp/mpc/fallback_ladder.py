@@ -20,7 +20,7 @@ from ocp.mpc.input_limits import InputLimits, Instant
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import InputMap, PlantInput
 from ocp.mpc.step_inputs import InputCollector, Parameters, StepInputs, joined
-from ocp.problem.constraint_rows import ProblemRows
+from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import sizes_of
 from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
@@ -84,14 +84,14 @@ class FallbackLadder:
         program: the built solver.
         least: finds the plan that violates the constraints least; None where nothing can be
             violated, or the solver knows no such plan.
-        rows: what a plan must meet: the rows that the solver was given.
+        imposed: what a plan must meet: the rows that the solver was given, where it was.
         See ``MPC`` for all others.
     """
 
     ocp: OCP
     program: Program
     least: Program | None
-    rows: ProblemRows
+    imposed: ImposedRows
     dt: float
     applied: PlantInput
     backup: Backup
@@ -301,7 +301,7 @@ class FallbackLadder:
 
     @cached_property
     def _check(self) -> PlanCheck:
-        return PlanCheck(self.ocp, self.dt, self.compiled, self.rows)
+        return PlanCheck(self.ocp, self.dt, self.compiled, self.imposed)
 
     @cached_property
     def _input_map(self) -> InputMap:

@@ -129,7 +129,7 @@ class MPC:
             ocp=self.ocp,
             program=solver.build(self.ocp),
             least=solver.least_violating(self.ocp) if self.least_violating else None,
-            rows=solver.imposed(self.ocp),
+            imposed=solver.imposed(self.ocp),
             dt=self.dt,
             applied=self.applied,
             backup=self.backup_law,

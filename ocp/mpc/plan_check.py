@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp.closed_loop.model_rollout import IntervalParameters, ModelRollout
-from ocp.problem.constraint_rows import ProblemRows
+from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.fingerprint import differing, fingerprint
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
@@ -69,15 +69,17 @@ class PlanCheck:
         ocp: the problem.
         dt: sampling interval [s].
         compiled: whether the model runs as machine code.
-        rows: what a plan must meet: the rows that its solver was given.
+        imposed: what a plan must meet: the rows that its solver was given, where it was.
     """
 
     ocp: OCP
     dt: float
     compiled: bool
-    rows: ProblemRows
+    imposed: ImposedRows
     # By the number of intervals: a roll-out is prepared once for each.
     _rollouts: dict[int, ModelRollout] = field(default_factory=dict)
+    _own_rollouts: dict[int, ModelRollout] = field(default_factory=dict)
+    _input_rollouts: dict[int, ModelRollout] = field(default_factory=dict)
 
     def new_plan(
         self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
@@ -93,7 +95,7 @@ class PlanCheck:
             if not self._is_constrained:
                 return 0.0, ""
             u = plan_controls(plan, plan.t[:-1])
-            return self._rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
+            return self._own_rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
         if plan.status not in _USABLE:
             return np.inf, plan.status.value
         return self.remainder(plan, start, t, p)
@@ -155,13 +157,24 @@ class PlanCheck:
         return self._rollout(1).of(x, u[None, :], times, ends).x[-1]
 
     def _rollout(self, n: int) -> ModelRollout:
+        """Return a roll-out that checks the rows at all nodes."""
         if n not in self._rollouts:
-            self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled, rows=self.rows)
+            imposed = ImposedRows(self.imposed.rows)
+            self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled, imposed=imposed)
         return self._rollouts[n]
 
+    def _own_rollout(self, n: int) -> ModelRollout:
+        """Return one that checks a solver's own nodes."""
+        if n not in self._own_rollouts:
+            self._own_rollouts[n] = replace(self._rollout(n), imposed=self.imposed)
+        return self._own_rollouts[n]
+
     def _input_rollout(self, n: int) -> ModelRollout:
-        """Return a roll-out that checks the limits of the input alone."""
-        return replace(self._rollout(n), rows=self.ocp.rows.softened())
+        """Return one that checks the limits of the input alone."""
+        if n not in self._input_rollouts:
+            imposed = ImposedRows(self.ocp.rows.softened())
+            self._input_rollouts[n] = replace(self._rollout(n), imposed=imposed)
+        return self._input_rollouts[n]
 
     def _differs(self, problem: OCP) -> bool:
         return bool(differing(fingerprint(problem), fingerprint(self.ocp)))
@@ -169,4 +182,5 @@ class PlanCheck:
     @cached_property
     def _is_constrained(self) -> bool:
         """Whether there is anything along the way that a plan could violate."""
-        return any(r.is_imposed for r in (self.rows.path, self.rows.states, self.rows.controls))
+        rows = self.imposed.rows
+        return any(part.is_imposed for part in (rows.path, rows.states, rows.controls))

@@ -241,6 +241,23 @@ class ProblemRows:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class ImposedRows:
+    """The rows that a solver imposes, and the nodes of its grid at which it does not.
+
+    Attributes:
+        rows: of the problem; soft ones have no bounds.
+        no_control_rows: at which nodes rows with a control do not hold, beside the last one, where
+            no control is left, bool (N + 1,); None: at no other.
+        no_state_rows: at which nodes rows of states alone do not hold, beside the first one, which
+            is measured, bool (N + 1,); None: at no other.
+    """
+
+    rows: ProblemRows
+    no_control_rows: np.ndarray | None = None
+    no_state_rows: np.ndarray | None = None
+
+
 def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
     """Return which rows of a column contain any of some symbols, bool (m,)."""
     structure = np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
-from ocp.problem.constraint_rows import ProblemRows
+from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
 from ocp.solution.solution import Solution
 
@@ -79,12 +79,13 @@ class Solver(ABC):
         """
         return self.build(ocp)
 
-    def imposed(self, ocp: OCP) -> ProblemRows:
-        """Return the rows that a successful answer of this solver meets; here all of the problem.
+    def imposed(self, ocp: OCP) -> ImposedRows:
+        """Return the rows that a successful answer of this solver meets; here all, at all nodes.
 
-        A solver that makes rows soft says which, and whoever judges its plans asks for it here.
+        A solver that makes rows soft, or imposes them elsewhere than at its nodes, says so, and
+        whoever judges its plans asks for it here.
         """
-        return ocp.rows
+        return ImposedRows(ocp.rows)
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "Solver":
         """Return the solver as ``MPC`` runs it; here as it is.

@@ -8,6 +8,7 @@ import numpy as np
 from ocp import OCP, InitialGuess, Program, Solution, Status, UnsupportedProblem
 from ocp.internal import (
     Epigraph,
+    ImposedRows,
     MethodProgram,
     RunData,
     RunResult,
@@ -122,6 +123,15 @@ class Collocation(ScalingSolver):
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Replace every kink: slacks and maxima meet at the collocation points."""
         return epigraph(ocp)
+
+    def imposed(self, ocp: OCP) -> ImposedRows:
+        """Return the rows of the problem, which hold at the points, not at the edges; see above.
+
+        A control jumps at an edge: that of the point there is the one before the jump.
+        """
+        grid = CollocationGrid.of(self.mesh_of(ocp), self.points)
+        edges = np.isin(np.arange(len(grid.nodes)), grid.edge_nodes)
+        return ImposedRows(ocp.rows, edges, edges if self.points == "gauss" else None)
 
     def least_violating(self, ocp: OCP) -> Program | None:
         """Build the problem with a slack for its hard rows; see ``Solver``."""

@@ -7,11 +7,11 @@ import numpy as np
 
 from ocp import OCP, InitialGuess, Program, Status, Work, linear_quadratic
 from ocp.internal import (
+    ImposedRows,
     LinearQuadratic,
     LQData,
     Matrices,
     MethodProgram,
-    ProblemRows,
     RunData,
     RunResult,
     ScalingSolver,
@@ -72,9 +72,9 @@ class LinearMPC(ScalingSolver):
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")
 
-    def imposed(self, ocp: OCP) -> ProblemRows:
+    def imposed(self, ocp: OCP) -> ImposedRows:
         """Return the rows that an answer meets: with a penalty, those that limit the input."""
-        return ocp.rows if self.soft is None else ocp.rows.softened()
+        return ImposedRows(ocp.rows if self.soft is None else ocp.rows.softened())
 
     def least_violating(self, ocp: OCP) -> Program | None:
         """Build the program with soft rows; None where they are soft already, or there are none."""

@@ -189,7 +189,7 @@ def test_a_price_is_followed_in_the_loop(solver) -> None:
 
 def test_a_solver_without_rows_is_asked_the_same_way() -> None:
     plain = cart()
-    assert StagewiseNewton(10).imposed(plain) is plain.rows
-    soft = LinearMPC(soft=1.0).imposed(cart(state_bounds=Box(-9.0, 9.0)))
+    assert StagewiseNewton(10).imposed(plain).rows is plain.rows
+    soft = LinearMPC(soft=1.0).imposed(cart(state_bounds=Box(-9.0, 9.0))).rows
     assert {row.kind for row in soft.states.rows} == {"soft"}
     assert {row.kind for row in soft.controls.rows} == {"input"}
