@@ -6,7 +6,7 @@ from benchmarks.commands.certify import CERTIFY
 from benchmarks.commands.command import Command
 from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
-from benchmarks.commands.loops import FAULTS, MPC
+from benchmarks.commands.loops import FAULTS, FOLLOWED, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
 from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
@@ -27,6 +27,7 @@ COMMANDS: tuple[Command, ...] = (
     CLEAR,
     MPC,
     FAULTS,
+    FOLLOWED,
     MISTAKES_COMMAND,
     PEERS_COMMAND,
     ROOMS,

@@ -1,4 +1,4 @@
-"""``mpc`` and ``faults``: closed loops, undisturbed and with everything failing."""
+"""``mpc``, ``faults`` and ``followed``: closed loops, with everything failing, and at random."""
 
 from argparse import ArgumentParser, Namespace
 
@@ -8,7 +8,7 @@ from benchmarks.cases import arm_cases
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import add_out, positive, seconds
 from benchmarks.mpc.arm_loop import SOLVERS
-from benchmarks.mpc.commands import SHORT, print_faults, print_loops
+from benchmarks.mpc.commands import SHORT, print_faults, print_followed, print_loops
 from benchmarks.mpc.dial import COMPARED, HORIZONS, SCENARIOS
 from ocp import ProblemError
 
@@ -56,5 +56,17 @@ def _faults(options: Namespace, console: Console) -> int:
     return print_faults(console, options.steps, options.seed, options.workers)
 
 
+def _followed_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--problems", type=positive, default=60, metavar="K")
+    parser.add_argument("--seed", type=int, default=0)
+
+
+def _followed(options: Namespace, console: Console) -> int:
+    return print_followed(console, options.problems, options.seed)
+
+
 MPC = Command("mpc", "closed loops over the horizon, and other plants", _mpc_options, _mpc)
 FAULTS = Command("faults", "closed loops in which everything fails", _faults_options, _faults)
+FOLLOWED = Command(
+    "followed", "random loops: is every solved plan followed?", _followed_options, _followed
+)

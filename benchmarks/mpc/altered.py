@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, Program, Solution, Solver
+from ocp.internal import ImposedRows
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,15 @@ class Altered(Solver):
         """Set what is left open; see ``Solver``."""
         inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
         return replace(self, inner=inner)
+
+    def imposed(self, ocp: OCP) -> ImposedRows:
+        """Return what the inner one imposes."""
+        return self.inner.imposed(ocp)
+
+    def least_violating(self, ocp: OCP) -> "AlteredProgram | None":
+        """Build what the inner one does; its answers are changed as well."""
+        program = self.inner.least_violating(ocp)
+        return None if program is None else AlteredProgram(self, program)
 
     def build(self, ocp: OCP) -> "AlteredProgram":
         """Build the inner one."""

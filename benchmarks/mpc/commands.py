@@ -1,4 +1,4 @@
-"""``python -m benchmarks mpc`` and ``faults``."""
+"""``python -m benchmarks mpc``, ``faults`` and ``followed``."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -15,6 +15,7 @@ from benchmarks.mpc import cart_pole_loop as cart_pole
 from benchmarks.mpc.dial import HORIZONS, crossings_table, sweep
 from benchmarks.mpc.endings import ENDINGS, loop_with
 from benchmarks.mpc.faults import SUBJECTS, FaultReport, campaign
+from benchmarks.mpc.followed import FollowedLoop, random_loops
 from benchmarks.mpc.late import DELAY, delayed_loops
 from benchmarks.mpc.loop_row import LoopRow
 from benchmarks.mpc.mass_loop import DT, receding
@@ -24,7 +25,7 @@ _SHORT = (0.02, 0.06, 0.1, 0.2, 0.3)  # [s]
 _ENDED = ("arm-001", "arm-002", "arm-004")
 _DELAYED, _MASS_HORIZONS = 0.35, (5, 10, 20, 40)
 # A step of the arm costs several of the cart.
-_SHARES = {"cart": 0.8, "arm": 0.2}
+_SHARES = {"cart": 0.5, "arm": 0.2, "heating": 0.3}
 
 
 def print_loops(
@@ -115,6 +116,23 @@ def print_faults(console: Console, steps: int, seed: int, workers: int = 1) -> i
             console.print(said(report))
             clean &= report.is_clean
     return int(not clean)
+
+
+def print_followed(console: Console, problems: int, seed: int) -> int:
+    """Run random loops and print those that do not follow; return 0 if there is none."""
+    loops: list[FollowedLoop] = []
+    with Progress(console=console, transient=True) as bar:
+        for found in bar.track(random_loops(problems, seed=seed), total=problems):
+            loops.append(found)
+            if not found.is_good:
+                bar.console.print(str(found), markup=False, highlight=False, soft_wrap=True)
+    solved, steps = sum(f.solved for f in loops), sum(f.steps for f in loops)
+    followed, outside = sum(f.followed for f in loops), sum(f.outside for f in loops)
+    console.print(
+        f"{problems} problems, {steps} steps, {solved} solved: {followed} of these followed, "
+        f"{outside} inputs outside a row that limits them"
+    )
+    return int(not all(f.is_good for f in loops))
 
 
 def _pieces(

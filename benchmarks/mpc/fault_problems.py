@@ -1,8 +1,9 @@
-"""A cart and an arm that run for ever, and can be asked for what is not possible."""
+"""A cart, an arm and a heated room that run for ever, and can be asked for what is not possible."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import cast
 
 import casadi as ca
 import numpy as np
@@ -11,8 +12,8 @@ from numpy.typing import ArrayLike
 from benchmarks.mpc.altered import Altered
 from benchmarks.mpc.faulty import Fault, Schedule, Spoiled, active
 from models import Disc, DistanceCost, PlanarArm, redundancy_ocp
-from ocp import MPC, OCP, Box, Constraint, Model, Parameter, Plant, PlantInput
-from solvers import MultipleShooting, PrioritisedKinematics, track
+from ocp import MPC, OCP, Box, Constraint, Model, Parameter, Plant, PlantInput, with_input_rate
+from solvers import LinearMPC, MultipleShooting, PrioritisedKinematics, track
 
 MISMATCH = 0.3
 _FORCE, _FASTEST, _ASIDE = 2.0, 1.5, 3.0
@@ -44,11 +45,13 @@ class FaultProblem:
         mpc: the controller, its solver failing on the schedule.
         plant: the truth, another one on the schedule.
         x0: first state.
+        faulty_states: whose sensors may fail; None: all.
     """
 
     mpc: MPC
     plant: Plant
     x0: tuple[float, ...]
+    faulty_states: tuple[int, ...] | None = None
 
 
 def cart(faults: Schedule) -> FaultProblem:
@@ -87,7 +90,7 @@ def cart(faults: Schedule) -> FaultProblem:
             solver=Altered(_SOLVER, Spoiled(dt, faults)),
             dt=dt,
             backup=lambda x, t: [-2.0 * x[0] - 2.0 * x[1]],
-            parameters=lambda t: wanted(t, active(faults, t, dt)),
+            parameters=lambda t: _known(wanted, faults, t, dt),
         ),
         plant=_other(ca.vertcat(x[1], _GAIN * u), x, u, partial(_actual, faults, dt)),
         x0=(0.0, 0.0),
@@ -141,11 +144,85 @@ def arm(faults: Schedule) -> FaultProblem:
             dt=dt,
             applied=PlantInput("rate", Box(-_JOINTS, _JOINTS)),
             backup=backup.velocity,
-            parameters=lambda t: wanted(t, active(faults, t, dt)),
+            parameters=lambda t: _known(wanted, faults, t, dt),
         ),
         plant=_other(_GAIN * u, q, u, partial(_actual, faults, dt)),
         x0=_START,
     )
+
+
+def heating(faults: Schedule) -> FaultProblem:
+    """Return a room of two walls, heated by a valve that moves slowly, for a price.
+
+    The control is the change of the valve, at most 0.2 a step; the valve is between 0 and what the
+    boiler gives, which varies with time, the sum of both path constraints in rate form. The warmth
+    is limited softly. Nothing but the sensors of warmth fails: the valve knows where it is.
+    """
+    dt, x, u, t = 1.0, ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("t")
+    target, limit = ca.SX.sym("target"), ca.SX.sym("wall")
+    warmth, wall = x[0], x[1]
+    supply = Constraint("supply", u - 1.0 - 0.4 * ca.sin(0.3 * t), upper=0.0, limits_input=True)
+    plain = OCP(
+        name="heating",
+        model=Model(
+            name="heating",
+            x=x,
+            u=u,
+            t=t,
+            f=ca.vertcat(
+                warmth + 0.2 * (wall - warmth) + u, wall + 0.1 * (warmth - wall) - 0.05 * wall
+            ),
+            dt=dt,
+        ),
+        x0=[2.0, 1.5],
+        horizon=10,
+        running_cost=0.3 * u + 0.1 * u**2 + (warmth - 3.0 - target) ** 2,
+        control_bounds=Box(0.0, 1.5),
+        constraints=(supply, Constraint("comfort", warmth - limit, upper=0.0)),
+        parameters=(Parameter("target", target, 0.0), Parameter("wall", limit, 10.0)),
+    )
+
+    def wanted(t: float, fault: Fault | None) -> Mapping[str, float]:
+        away = fault is not None and fault.kind == "infeasible target"
+        blocked = fault is not None and fault.kind == "obstacle"
+        return {"target": _NOWHERE if away else 0.0, "wall": 1.0 if blocked else 10.0}
+
+    ocp = with_input_rate(plain, rate=Box(-0.2, 0.2), weight=0.01)
+    m = ocp.model
+    truth = _other(
+        ca.substitute(m.f, m.u, _GAIN * m.u),
+        m.x,
+        m.u,
+        partial(_actual, faults, dt),
+        dt=dt,
+        noise=[1e-4, 1e-4, 0.0],
+    )
+    return FaultProblem(
+        mpc=MPC(
+            ocp=ocp,
+            solver=Altered(LinearMPC(soft=100.0), Spoiled(dt, faults)),
+            dt=dt,
+            parameters=lambda t: _known(wanted, faults, t, dt),
+        ),
+        plant=truth,
+        x0=(2.0, 1.5, 0.3),
+        faulty_states=(0, 1),
+    )
+
+
+def _known(
+    wanted: Callable[[float, Fault | None], Mapping[str, ArrayLike]],
+    faults: Schedule,
+    t: float,
+    dt: float,
+) -> Mapping[str, ArrayLike]:
+    """Return what is wanted, or nothing, or the error of a line that is down."""
+    fault = active(faults, t, dt)
+    if fault is not None and fault.kind == "no parameters":
+        if fault.size > 0.0:
+            raise ConnectionError("on schedule: the line is down")
+        return cast(Mapping[str, ArrayLike], None)
+    return wanted(t, fault)
 
 
 def _actual(faults: Schedule, dt: float, t: float) -> Mapping[str, float]:
@@ -156,13 +233,21 @@ def _actual(faults: Schedule, dt: float, t: float) -> Mapping[str, float]:
     return {"gain": 1.0 + (MISMATCH if fault.size > 0.0 else -MISMATCH)}
 
 
-def _other(f: ca.SX, x: ca.SX, u: ca.SX, parameters: Callable) -> Plant:
+def _other(
+    f: ca.SX,
+    x: ca.SX,
+    u: ca.SX,
+    parameters: Callable,
+    *,
+    dt: float | None = None,
+    noise: ArrayLike = 1e-4,
+) -> Plant:
     ocp = OCP(
         name="plant",
-        model=Model(name="plant", x=x, u=u, f=f),
+        model=Model(name="plant", x=x, u=u, f=f, dt=dt),
         x0=np.zeros(x.numel()),
-        horizon=1.0,
+        horizon=1.0 if dt is None else 1,
         running_cost=ca.sumsqr(u),
         parameters=(Parameter("gain", _GAIN, 1.0),),
     )
-    return Plant(ocp=ocp, parameters=parameters, measurement_noise=1e-4)
+    return Plant(ocp=ocp, parameters=parameters, measurement_noise=noise)

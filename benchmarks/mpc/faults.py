@@ -11,13 +11,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.mpc.fault_problems import FaultProblem, arm, cart
+from benchmarks.mpc.fault_problems import FaultProblem, arm, cart, heating
 from benchmarks.mpc.faulty import NEVER_OPTIMAL, Hindered, Schedule, active, schedule
-from ocp import FlightRecorder, InputSource, Rollout, closed_loop, replay_all
+from benchmarks.mpc.followed import outside_limits
+from ocp import MPC, Decision, FlightRecorder, InputSource, Rollout, closed_loop, replay_all
 
-SUBJECTS: Mapping[str, Callable[[Schedule], FaultProblem]] = {"cart": cart, "arm": arm}
+SUBJECTS: Mapping[str, Callable[[Schedule], FaultProblem]] = {
+    "cart": cart,
+    "arm": arm,
+    "heating": heating,
+}
 # Steps in one loop and one flight record.
 PIECE = 500
+# What a row that limits an input may be left by.
+_ROUNDING = 1e-9
 # Steps after a fault within which a decision is optimal again.
 RECOVERY = 10
 
@@ -27,11 +34,11 @@ class FaultReport:
     """What a campaign on one subject found; all but the counts should be zero.
 
     Attributes:
-        subject: cart or arm.
+        subject: of ``SUBJECTS``.
         steps: in all.
         faults: faults by kind.
         sources: decisions by kind of fault ("none" between them) and rung.
-        bad_inputs: that are not finite or leave their bounds.
+        bad_inputs: that are not finite or leave a row that limits them.
         unnamed: steps that are not optimal and do not say why.
         lies: steps called optimal although they cannot be.
         slow: faults after which no decision was optimal within ``RECOVERY`` calm steps.
@@ -89,7 +96,7 @@ def campaign(
 def _piece(name: str, steps: int, seed: int) -> FaultReport:
     faults = schedule(steps, seed)
     subject = SUBJECTS[name](faults)
-    mpc, hindered = subject.mpc, Hindered(subject.mpc, faults)
+    mpc, hindered = subject.mpc, Hindered(subject.mpc, faults, subject.faulty_states)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "flight"
         with FlightRecorder(mpc, file) as recorder:
@@ -105,9 +112,7 @@ def _piece(name: str, steps: int, seed: int) -> FaultReport:
 def _judged(
     name: str, subject: FaultProblem, faults: Schedule, rollout: Rollout, again: list[bool]
 ) -> FaultReport:
-    box = subject.mpc.applied.box(subject.mpc.ocp)
     dt, decisions = subject.mpc.dt, rollout.decisions
-    inputs = np.array([d.input for d in decisions])
     at = [active(faults, d.t, dt) for d in decisions]
     kinds = [fault.kind if fault else "none" for fault in at]
     return FaultReport(
@@ -115,7 +120,9 @@ def _judged(
         steps=len(decisions),
         faults=Counter(fault.kind for fault in faults),
         sources=Counter((kind, d.source) for kind, d in zip(kinds, decisions, strict=True)),
-        bad_inputs=int((~np.isfinite(inputs) | (box.excess(inputs) > 0.0)).any(axis=1).sum()),
+        bad_inputs=sum(
+            _leaves_limits(subject.mpc, x, d) for x, d in zip(rollout.x, decisions, strict=False)
+        ),
         unnamed=sum(d.source is not InputSource.OPTIMAL and not d.message for d in decisions),
         lies=sum(
             kind in NEVER_OPTIMAL and d.source is InputSource.OPTIMAL
@@ -126,6 +133,17 @@ def _judged(
         replayed=len(again),
         differing=again.count(False),
     )
+
+
+def _leaves_limits(mpc: MPC, x: np.ndarray, decision: Decision) -> bool:
+    """Whether an input leaves its bounds, or a row that limits it in the true state."""
+    if not np.isfinite(decision.input).all():
+        return True
+    if mpc.applied.box(mpc.ocp).excess(decision.input).any():
+        return True
+    if mpc.applied.what == "rate":
+        return False
+    return outside_limits(mpc.ocp, x, decision.input, decision.applies_at) > _ROUNDING
 
 
 def _is_slow(rollout: Rollout, first: int) -> bool:

@@ -1,21 +1,28 @@
 """Things that fail on a schedule: a solver, a sensor, a computer that is too slow."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from ocp import MPC, Decision, Solution, Status
 
 # What happens inside the solver, or to its answer.
-IN_SOLVER = ("exception", "no convergence", "iteration limit", "nan answer", "out of bounds")
+IN_SOLVER = (
+    "exception", "driver error", "no convergence", "iteration limit", "nan answer",
+    "out of bounds", "no answer", "foreign answer",
+)  # fmt: skip
 # What the controller is told.
-IN_SENSOR = ("nan measurement", "jumped measurement")
+IN_SENSOR = ("nan measurement", "absurd measurement", "jumped measurement", "outlier")
 # What it is asked for, or meets.
-OUTSIDE = ("late answer", "infeasible target", "obstacle", "mismatch")
+OUTSIDE = ("late answer", "no parameters", "infeasible target", "obstacle", "mismatch")
 KINDS = (*IN_SOLVER, *IN_SENSOR, *OUTSIDE)
 # No decision may be called optimal while one of these lasts.
-NEVER_OPTIMAL = frozenset({*IN_SOLVER, "nan measurement", "late answer"})
+NEVER_OPTIMAL = frozenset(
+    {*IN_SOLVER, "nan measurement", "absurd measurement", "late answer", "no parameters"}
+)
+# The largest number of single precision, which marks a sample that is none.
+_ABSURD, _OUTLIER = 3.4028235e38, 1e5
 _CALM, _LENGTH = (15, 30), (1, 8)  # steps
 
 
@@ -57,6 +64,10 @@ def active(faults: Schedule, t: float, dt: float) -> Fault | None:
     return next((fault for fault in faults if fault.first <= k <= fault.last), None)
 
 
+class DriverError(Exception):
+    """What somebody else's code raises, of no kind that anybody expects."""
+
+
 @dataclass(frozen=True)
 class Spoiled:
     """What a schedule makes of a good solver's answers; for ``Altered``.
@@ -80,6 +91,12 @@ def _spoilt(solution: Solution, fault: Fault) -> Solution:
     match fault.kind:
         case "exception":
             raise RuntimeError(said)
+        case "driver error":
+            raise DriverError(said)
+        case "no answer":
+            return cast(Solution, None)
+        case "foreign answer":
+            return solution.with_(t=solution.t + 10.0)
         case "no convergence":
             return solution.with_(status=Status.DIVERGED, message=said)
         case "iteration limit":
@@ -95,10 +112,17 @@ def _spoilt(solution: Solution, fault: Fault) -> Solution:
 
 @dataclass(frozen=True, eq=False)
 class Hindered:
-    """An ``MPC`` whose answers come too late on a schedule, rather than by the clock."""
+    """An ``MPC`` whose answers come too late on a schedule, rather than by the clock.
+
+    Attributes:
+        mpc: the controller.
+        faults: the schedule.
+        faulty_states: whose sensors may fail; None: all.
+    """
 
     mpc: MPC
     faults: Schedule = field(default=())
+    faulty_states: tuple[int, ...] | None = None
 
     @property
     def delay(self) -> float:
@@ -117,10 +141,17 @@ class Hindered:
     def sensors(self, x: np.ndarray, t: float) -> np.ndarray:
         """Return what the controller is told of a measurement."""
         fault = active(self.faults, t, self.mpc.dt)
-        match fault.kind if fault else "":
+        if fault is None or fault.kind not in IN_SENSOR:
+            return x
+        every = tuple(range(len(x)))
+        fails = np.isin(every, self.faulty_states or every)
+        match fault.kind:
             case "nan measurement":
-                return np.where(np.arange(len(x)) == 0, np.nan, x)
-            case "jumped measurement":
-                assert fault is not None
-                return x + 2.0 * fault.size
-        return x
+                wrong = np.where(np.cumsum(fails) == 1, np.nan, x)
+            case "absurd measurement":
+                wrong = np.full(len(x), np.copysign(_ABSURD, fault.size))
+            case "outlier":
+                wrong = x + _OUTLIER * fault.size
+            case _:
+                wrong = x + 2.0 * fault.size
+        return np.where(fails, wrong, x)

@@ -170,9 +170,9 @@ class PlanCheck:
         return self._own_rollouts[n]
 
     def _input_rollout(self, n: int) -> ModelRollout:
-        """Return one that checks the limits of the input alone."""
+        """Return one that checks the limits of the input alone, at a solver's own nodes."""
         if n not in self._input_rollouts:
-            imposed = ImposedRows(self.ocp.rows.softened())
+            imposed = replace(self.imposed, rows=self.ocp.rows.softened())
             self._input_rollouts[n] = replace(self._rollout(n), imposed=imposed)
         return self._input_rollouts[n]
 

@@ -68,8 +68,9 @@ def test_the_cart_pole_is_printed(capsys) -> None:
 def test_a_short_campaign_is_clean(capsys) -> None:
     assert main(["faults", "--steps", "100", "--seed", "1"]) == 0
     shown = capsys.readouterr().out
-    assert "cart: 80 steps, clean" in shown
+    assert "cart: 50 steps, clean" in shown
     assert "arm: 20 steps, clean" in shown
+    assert "heating: 30 steps, clean" in shown
     assert "0 inputs not finite or out of bounds" in shown
 
 

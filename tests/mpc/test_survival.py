@@ -284,6 +284,18 @@ def test_where_no_plan_meets_a_limit_the_least_violation_is_chosen(solver: Solve
     assert "longer horizon" in repr(rollout)
 
 
+def test_a_limit_of_the_input_that_moves_is_kept_by_what_acts_at_an_edge() -> None:
+    """Between two points a control is held at its mean, which the limit at their edge excludes."""
+    plain, t = cart(), ca.SX.sym("t")
+    model = replace(plain.model, t=t)
+    supply = Constraint("supply", model.u - 0.5 - ca.sin(9 * t), upper=0.0)
+    asked = replace(plain, model=model, x0=[-1.0, 0.0], constraints=(*plain.constraints, supply))
+    rollout = controller(Collocation(5), ocp=asked).run(Plant(ocp=plain), [-1.0, 0.0], 1.0)
+    for k, u in enumerate(rollout.inputs.ravel()):
+        assert u <= 0.5 + np.sin(9 * DT * k) + 1e-9
+    assert InputSource.BACKUP not in rollout.sources
+
+
 def test_linear_mpc_has_the_rung_as_well() -> None:
     edge = replace(LINEAR, x0=[0.0, 0.0], state_bounds=Box([-9.0, -9.0], [0.1, 9.0]))
     mpc = controller(LinearMPC(), ocp=edge)
