@@ -4,8 +4,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
 
-from ocp import OCP, InitialGuess, Program, Status, Work, linear_quadratic
+from ocp import OCP, InitialGuess, Program, Status, UnsupportedProblem, Work, linear_quadratic
 from ocp.internal import (
     ImposedRows,
     LinearQuadratic,
@@ -23,11 +24,13 @@ from ocp.internal import (
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.linear_forms import Condensed, MPCForm, Sparse
 from solvers.linear.qp.least_violation import least_violation
-from solvers.linear.qp.qp_backends import QpBackend, QpResult, qp_backend
+from solvers.linear.qp.qp_backends import NEEDS_CURVATURE, QpBackend, QpResult, qp_backend
 from solvers.linear.qp.quadratic_program import QP, Softening
 
 # A constraint that no point can meet better than this is infeasible, not inaccurate.
 _UNAVOIDABLE = 1e-7
+# A matrix whose smallest eigenvalue is this part of the largest is singular but for rounding.
+_SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,18 @@ class LinearMPC(ScalingSolver):
             self, ocp, lq, form, qp_backend(self.backend, self.tolerance), softening
         )
         program.prepare(lq.sample_matrices(lq.declared) if lq.fixed is None else lq.fixed)
+        if self.backend in NEEDS_CURVATURE and not _is_strictly_convex(form.H):
+            raise UnsupportedProblem(
+                f"{ocp.name}: {self.backend} needs a positive definite matrix H, which a state "
+                f"without a weight makes singular in {self.form} form; take form='condensed' or "
+                "another backend"
+            )
         return program
+
+
+def _is_strictly_convex(h: sp.csc_matrix) -> bool:
+    values = np.linalg.eigvalsh(h.toarray())
+    return bool(values[0] > _SINGULAR * values[-1])
 
 
 _FORMS: dict[str, type[Sparse] | type[Condensed]] = {"sparse": Sparse, "condensed": Condensed}

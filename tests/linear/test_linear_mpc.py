@@ -18,7 +18,18 @@ from models import (
     tracking_ocp,
     unstable_plant,
 )
-from ocp import OCP, Box, Constraint, Model, ProblemError, Solution, Status, evaluate, solve
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    Model,
+    ProblemError,
+    Solution,
+    Status,
+    UnsupportedProblem,
+    evaluate,
+    solve,
+)
 from solvers import LinearMPC, MultipleShooting
 from solvers.linear.qp.qp_backends import NamedBackend, known_backends, qp_backend
 from solvers.linear.qp.quadratic_program import residuals
@@ -312,3 +323,19 @@ def test_a_solution_starts_it():
     for form in FORMS:
         mine = LinearMPC(form=form).prepare(ocp).run(x0=[1.5, 2.0], guess=other)
         assert mine.status is Status.SOLVED
+
+
+def test_a_backend_that_needs_curvature_is_refused_at_build_without_it() -> None:
+    pytest.importorskip("quadprog")
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    seen = OCP(
+        name="position only",
+        model=Model(name="mass", x=x, u=u, f=ca.vertcat(x[0] + 0.1 * x[1], x[1] + u), dt=0.1),
+        x0=[1.0, 0.0],
+        horizon=10,
+        running_cost=x[0] ** 2 + u**2,
+    )
+    with pytest.raises(UnsupportedProblem, match="positive definite"):
+        LinearMPC("quadprog").build(seen)
+    condensed = solve(seen, LinearMPC("quadprog", form="condensed"))
+    assert condensed.cost == pytest.approx(solve(seen, LinearMPC()).cost)

@@ -16,6 +16,8 @@ from ocp import ProblemError
 from solvers.linear.qp.active_set import ActiveSet
 from solvers.linear.qp.quadratic_program import NO_POINT, QP, Residuals, residuals
 
+# Backends whose method begins with a factorisation of H.
+NEEDS_CURVATURE = frozenset({"quadprog"})
 # A backend measures its residuals in its own way; it is asked for this much more.
 _MARGIN = 0.1
 # A matrix with more than this part of its entries not zero is given as a dense one.
