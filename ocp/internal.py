@@ -12,6 +12,7 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.codegen.buffered_function import BufferedFunction
+from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import c_code, compiled
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
@@ -47,7 +48,9 @@ from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, el
 
 __all__ = [
     "ACCURACY",
+    "QUIET",
     "BufferedFunction",
+    "BufferedNlp",
     "ConstraintRow",
     "ConstraintRows",
     "Epigraph",
