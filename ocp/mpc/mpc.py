@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
+from threading import Lock
 
 from numpy.typing import ArrayLike
 
@@ -115,6 +116,8 @@ class MPC:
     _ladder: FallbackLadder = field(init=False, repr=False)
     # The only part that a step changes.
     state: ControllerState = field(init=False, repr=False)
+    # A step takes the state that the step before it has left.
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
@@ -180,9 +183,10 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        raised = hasattr(self, "state") and self.state.solver_raised
-        begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
-        self.state = begun._replace(solver_raised=raised)
+        with self._lock:
+            raised = hasattr(self, "state") and self.state.solver_raised
+            begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
+            self.state = begun._replace(solver_raised=raised)
 
     def step(
         self,
@@ -205,9 +209,11 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        if self.state.solver_raised:
-            self._ladder = self._built()
-        report, self.state = self._ladder.step(self.state, x, t, late=late, parameters=parameters)
+        with self._lock:
+            if self.state.solver_raised:
+                self._ladder = self._built()
+            ladder, state = self._ladder, self.state
+            report, self.state = ladder.step(state, x, t, late=late, parameters=parameters)
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)
         return report
