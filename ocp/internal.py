@@ -38,6 +38,7 @@ from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
+from ocp.problem.portable import Portable
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
@@ -45,12 +46,14 @@ from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.solver import BuiltProgram
 
 __all__ = [
     "ACCURACY",
     "QUIET",
     "BufferedFunction",
     "BufferedNlp",
+    "BuiltProgram",
     "ConstraintRow",
     "ConstraintRows",
     "Epigraph",
@@ -62,6 +65,7 @@ __all__ = [
     "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
+    "Portable",
     "ProblemRows",
     "RunData",
     "RunResult",

@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike
 from ocp.checks.interrupts import interruptible
 from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
-from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution, Work
-from ocp.solution.solver import InitialGuess, Program
+from ocp.solution.solver import BuiltProgram, InitialGuess
 from ocp.solution.status import Status
 
 
@@ -41,16 +40,10 @@ class RunResult:
 
 
 @dataclass(frozen=True, eq=False)
-class MethodProgram(Program):
-    """A program that solves by itself; one that runs other programs derives from ``Program``.
-
-    Attributes:
-        solver: the options.
-        ocp: the problem.
-    """
+class MethodProgram(BuiltProgram):
+    """A program that solves by itself; one that runs others derives from ``BuiltProgram``."""
 
     solver: MethodSolver
-    ocp: OCP
     # What a run writes to, memory of compiled code first of all, is one for all runs.
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 

@@ -1,9 +1,10 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from math import inf
 from threading import Lock
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -126,6 +127,11 @@ class MPC:
         self.reset()
         self._ladder = self._built()
 
+    def __reduce__(self) -> tuple[Callable[..., "MPC"], tuple[type["MPC"], dict[str, Any], Any]]:
+        """Copy and pickle options and ``state``; the copy builds its own solver."""
+        options = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        return _copied, (type(self), options, self.state)
+
     def _built(self) -> FallbackLadder:
         solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
         return FallbackLadder(
@@ -243,3 +249,9 @@ class MPC:
                     f"has {theirs}"
                 )
         return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+
+
+def _copied(kind: type[MPC], options: dict[str, Any], state: ControllerState) -> MPC:
+    controller = kind(**options)
+    controller.state = state
+    return controller

@@ -1,7 +1,8 @@
 """The interface of every solver: build once, run often."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance
 from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
+from ocp.problem.portable import Portable
 from ocp.solution.solution import Solution
 
 
@@ -61,7 +63,7 @@ class Program(ABC):
         """
 
 
-class Solver(ABC):
+class Solver(Portable, ABC):
     """A method with its options: a frozen dataclass whose fields are typed."""
 
     @abstractmethod
@@ -112,6 +114,30 @@ class Solver(ABC):
         Here as it is; see ``MethodSolver``.
         """
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltProgram(Program):
+    """A program that its solver can build again.
+
+    So copies and pickles are made, in another process too: of options and problem. What a program
+    keeps from its runs, such as an answer to start the next one from, stays behind.
+
+    Attributes:
+        solver: the options.
+        ocp: the problem.
+    """
+
+    solver: Solver
+    ocp: OCP
+
+    def __reduce__(self) -> tuple[Callable[..., Program], tuple[Solver, OCP]]:
+        """Return what builds it again."""
+        return _built, (self.solver, self.ocp)
+
+
+def _built(solver: Solver, ocp: OCP) -> Program:
+    return solver.prepare(ocp)
 
 
 def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
