@@ -1,10 +1,10 @@
 """Copies and pickles of descriptions: their fields travel, and what is the same symbol stays so.
 
 A CasADi symbol is what it is by identity: two of the same name are different. In a pickle, all
-expressions of a problem are one Function of their symbols, which keeps what they have in common, and
-every symbol is an object of its own, which a pickler writes once however often it comes. So all that
-is pickled together, such as a problem and its solutions, or a tuple of a constraint and its
-model, shares its symbols; what is pickled alone has new ones of the same names.
+expressions of a problem are one Function of their symbols, which keeps what they have in common,
+and every symbol is an object of its own, which a pickler writes once however often it comes. So
+all that is pickled together, such as a problem and its solutions, or a tuple of a constraint and
+its model, shares its symbols; what is pickled alone has new ones of the same names.
 """
 
 from collections.abc import Callable
