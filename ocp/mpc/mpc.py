@@ -58,6 +58,10 @@ class MPC:
     After two runs of the solver in a row without a plan that meets the constraints, every other one
     starts cold, as the first step does, since the last plan may mislead it.
 
+    Of several threads that ask for a step each waits for the one before. A copy, also in another
+    process, is built from the options again and goes on from a copy of ``state``; what the
+    solver's program keeps from its runs stays behind.
+
     A plan that took longer than ``budget`` is too late for its step: it is not applied, but kept
     as the last plan of later steps. Source: thesis Algorithm 3,
     2.2.1; [Mayne et al. 2000].

@@ -46,7 +46,7 @@ class Program(ABC):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Solve for these data.
+        """Solve for these data. Of several threads that ask, each waits for the one before.
 
         Args:
             x0: start (nx,), a guess of it where the start is free; default: the problem's.
@@ -60,6 +60,7 @@ class Program(ABC):
 
         Raises:
             ProblemError: if the data do not fit the problem.
+            KeyboardInterrupt: after Ctrl-C; the program can be run again.
         """
 
 

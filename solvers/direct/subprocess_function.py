@@ -90,19 +90,19 @@ class SubprocessFunction:
         if not self._finish.alive:  # the last call was interrupted, or the process lost in it
             self._start()
         self._requests += 1
-        number, reply = 0, None
+        number, reply, answered = 0, None, False
         try:
             self._pipe.send((self._requests, inputs))
             # Replies are numbered: if the process died between two calls, this call takes the
             # notice of that for its own loss, and its reply must not be taken by the next one.
             while number not in (self._requests, None):
                 number, reply = self._reply(self.seconds + _GRACE)
+            answered = True
         except (EOFError, ConnectionError):
-            self._finish()
             raise SubprocessLost("ended with its process") from None
-        except BaseException:  # Ctrl-C too
-            self._finish()
-            raise
+        finally:
+            if not answered:  # after Ctrl-C too
+                self._finish()
         return reply
 
     def _reply(self, seconds: float) -> tuple[int | None, Any]:
