@@ -11,6 +11,7 @@ from ocp.checks.arguments import (
     check_real,
     check_whole,
 )
+from ocp.checks.interrupts import interruptible
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import c_code, compiled
@@ -98,6 +99,7 @@ __all__ = [
     "in_original_units",
     "in_own_units",
     "interpolate",
+    "interruptible",
     "judged",
     "jumps_along",
     "least_violating",

@@ -1,7 +1,10 @@
-"""Ctrl-C in the middle of compiled code, which CasADi turns into another error."""
+"""Ctrl-C in the middle of compiled code: CasADi makes another error of it, or forgets it."""
 
+import signal
 from collections.abc import Callable
 from functools import wraps
+from threading import current_thread, main_thread
+from types import FrameType
 from typing import ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -24,14 +27,32 @@ def raise_interrupt(error: RuntimeError | SystemError) -> None:
 
 
 def interruptible(call: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a function that calls CasADi, so that Ctrl-C leaves it as ``KeyboardInterrupt``."""
+    """Decorate a function that calls CasADi, so that Ctrl-C leaves it as ``KeyboardInterrupt``.
+
+    When CasADi converts its arguments it clears whatever exception is on its way. So the main
+    thread, the only one that Python's handlers run in, notes what the handler of Ctrl-C raises.
+    """
 
     @wraps(call)
     def called(*args: P.args, **kwargs: P.kwargs) -> T:
+        handler = signal.getsignal(signal.SIGINT)
+        if not callable(handler) or current_thread() is not main_thread():
+            return call(*args, **kwargs)
+        raised: list[KeyboardInterrupt] = []
+
+        def noted(number: int, frame: FrameType | None) -> None:
+            try:
+                handler(number, frame)
+            except KeyboardInterrupt as interrupt:
+                raised.append(interrupt)
+                raise
+
+        signal.signal(signal.SIGINT, noted)
         try:
             return call(*args, **kwargs)
-        except (RuntimeError, SystemError) as error:
-            raise_interrupt(error)
-            raise
+        finally:
+            signal.signal(signal.SIGINT, handler)
+            if raised:
+                raise raised[0]
 
     return called

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
+from ocp.checks.interrupts import interruptible
 from ocp.problem.constraint_rows import ProblemRows
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import Portable
@@ -141,6 +142,7 @@ def _built(solver: Solver, ocp: OCP) -> Program:
     return solver.prepare(ocp)
 
 
+@interruptible
 def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
     """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
 

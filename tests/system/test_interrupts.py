@@ -85,6 +85,10 @@ def stiff() -> OCP:
     return OCP(name="stiff", model=model, x0=[0.0], horizon=10.0, running_cost=x**2 + 1e-3 * u**2)
 
 
+def building(solver: Solver, ocp: OCP) -> Callable[[], object]:
+    return lambda: solver.build(ocp)
+
+
 def running(solver: Solver, ocp: OCP) -> Callable[[], object]:
     return solver.build(ocp).run
 
@@ -106,7 +110,7 @@ def judging(ocp: OCP) -> Callable[[], object]:
 
 
 JOBS: dict[str, Callable[[], Callable[[], object]]] = {
-    "build": lambda: lambda: MultipleShooting(40).build(hard()),
+    "build": lambda: building(MultipleShooting(40), hard()),
     "ipopt": lambda: running(MultipleShooting(100), hard()),
     "fatrop": lambda: running(MultipleShooting(40, backend="fatrop"), hard()),
     "collocation": lambda: running(Collocation(20), hard()),
