@@ -33,6 +33,7 @@ from ocp import (
     solve,
 )
 from ocp.internal import scaled
+from ocp.method.least_violating import least_violating
 from ocp.problem.fingerprint import fingerprint
 from solvers import GPC, MultipleShooting, PrioritisedKinematics
 from tests.kinematic.problems import orientation, position
@@ -193,6 +194,13 @@ def test_a_copied_solution_is_worth_the_same(way: Callable, solver: Solver, ocp:
     here, there = evaluate(solution), evaluate(other)
     assert (there.cost, there.violation) == (here.cost, here.violation)
     np.testing.assert_array_equal(other.control(0.3), solution.control(0.3))
+
+
+@each_way
+def test_the_program_of_least_violation(way: Callable) -> None:
+    program = least_violating(MultipleShooting(10), cart())
+    assert program is not None
+    same_numbers(way(program).run(), program.run())
 
 
 @each_way
