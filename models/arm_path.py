@@ -8,6 +8,7 @@ import numpy as np
 from models.arm import PlanarArm
 from models.sampling import sampled
 from ocp import Parameter, ProblemError, Signal
+from ocp.internal import Portable
 
 # A path may begin this far from the end effector [m].
 _ON_PATH = 1e-9
@@ -18,7 +19,7 @@ _BORDER = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ArmPath:
+class ArmPath(Portable):
     """An end-effector path for an arm.
 
     Args:

@@ -14,7 +14,7 @@ from models.distances import signed_distance
 from models.obstacles import Disc, Obstacle, link_distances
 from models.sampling import sampled
 from ocp import Constraint, Parameter, ProblemError, Signal
-from ocp.internal import check_instance, check_not_negative, check_positive
+from ocp.internal import Portable, check_instance, check_not_negative, check_positive
 
 
 def clearance_constraint(
@@ -67,7 +67,7 @@ def check_avoidance(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Surroundings:
+class Surroundings(Portable):
     """Where the obstacles of a problem are from its start to its end.
 
     Args:

@@ -11,7 +11,9 @@ from ocp.checks.arguments import (
     check_real,
     check_whole,
 )
+from ocp.checks.interrupts import interruptible
 from ocp.codegen.buffered_function import BufferedFunction
+from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import c_code, compiled
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
@@ -42,6 +44,7 @@ from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
+from ocp.problem.portable import Portable
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
 from ocp.problem.start_feasibility import start_violation
@@ -49,10 +52,14 @@ from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.solver import BuiltProgram
 
 __all__ = [
     "ACCURACY",
+    "QUIET",
     "BufferedFunction",
+    "BufferedNlp",
+    "BuiltProgram",
     "ConstraintRow",
     "ConstraintRows",
     "Epigraph",
@@ -65,6 +72,7 @@ __all__ = [
     "MethodSolver",
     "ParameterValues",
     "PiecewisePolynomial",
+    "Portable",
     "RunData",
     "RunResult",
     "ScaledOCP",
@@ -96,6 +104,7 @@ __all__ = [
     "in_original_units",
     "in_own_units",
     "interpolate",
+    "interruptible",
     "judged",
     "jumps_along",
     "least_violating",

@@ -95,8 +95,8 @@ class ModelRollout:
         terminal = self._rows.terminal
         if not terminal:
             return 0.0, ""
-        values = np.array(self.ocp.functions.terminal(x, t, p)).T
-        return _in_words(terminal.largest_violation(values, np.array([t])))
+        (values,) = self._end(x, t, p)
+        return _in_words(terminal.largest_violation(values.T, np.array([t])))
 
     @property
     def _rows(self) -> ProblemRows:
@@ -110,6 +110,10 @@ class ModelRollout:
     @cached_property
     def _path(self) -> BufferedFunction:
         return BufferedFunction(self.ocp.functions.path.map(self.n + 1))
+
+    @cached_property
+    def _end(self) -> BufferedFunction:
+        return BufferedFunction(self.ocp.functions.terminal)
 
     @cached_property
     def _exempt(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Solve a problem without the kinks of its cost, and return a solution of it as it was written."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
@@ -9,6 +9,7 @@ from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
 from ocp.method.slack_program import SlackProgram
 from ocp.problem.epigraph import Epigraph
+from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
@@ -30,6 +31,10 @@ class EpigraphProgram(Program):
     epigraph: Epigraph
     smooth: SlackProgram
     written: Program | None
+
+    def __reduce__(self) -> tuple[Callable[..., Program], tuple[MethodSolver, OCP]]:
+        """Return what builds it again, see ``BuiltProgram``."""
+        return _built, (self.solver, self.epigraph.original)
 
     @property
     def is_stateful(self) -> bool:
@@ -54,3 +59,7 @@ class EpigraphProgram(Program):
         if not self.solver.judged:
             return answer
         return judged(answer, self.solver.success_accuracy, slack=self.solver.end_slack)
+
+
+def _built(solver: MethodSolver, ocp: OCP) -> Program:
+    return solver.build(ocp)

@@ -4,18 +4,19 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.checks.interrupts import interruptible
 from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
-from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution, Work
-from ocp.solution.solver import InitialGuess, Program
+from ocp.solution.solver import BuiltProgram, InitialGuess
 from ocp.solution.status import Status
 
 
@@ -39,17 +40,14 @@ class RunResult:
 
 
 @dataclass(frozen=True, eq=False)
-class MethodProgram(Program):
-    """A program that solves by itself; one that runs other programs derives from ``Program``.
-
-    Attributes:
-        solver: the options.
-        ocp: the problem.
-    """
+class MethodProgram(BuiltProgram):
+    """A program that solves by itself; one that runs others derives from ``BuiltProgram``."""
 
     solver: MethodSolver
-    ocp: OCP
+    # What a run writes to, memory of compiled code first of all, is one for all runs.
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
+    @interruptible
     def run(
         self,
         *,
@@ -59,10 +57,12 @@ class MethodProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data, see ``Program.run``, and compare a success with the referee."""
-        started = perf_counter()
         data = RunData.of(self.ocp, x0, t0, parameters)
-        result = self._solve(data, self._first_guess(guess))
-        seconds = perf_counter() - started
+        first = self._first_guess(guess)
+        with self._lock:
+            started = perf_counter()
+            result = self._solve(data, first)
+            seconds = perf_counter() - started
         solution = Solution(
             problem=self.ocp,
             solver=self._solver_text,

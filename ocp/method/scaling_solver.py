@@ -4,6 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from ocp.checks.arguments import check_instance
+from ocp.checks.interrupts import interruptible
 from ocp.method.epigraph_program import EpigraphProgram
 from ocp.method.method_solver import MethodSolver
 from ocp.method.scaled_program import ScaledProgram
@@ -21,6 +22,7 @@ class ScalingSolver(MethodSolver):
     Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.
     """
 
+    @interruptible
     def build(self, ocp: OCP) -> Program:
         """Do all symbolic work; kinks in the cost are replaced first, where that is exact.
 

@@ -8,14 +8,13 @@ import casadi as ca
 import numpy as np
 
 from ocp.codegen.buffered_function import BufferedFunction
+from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.mpc.plant_input import PlantInput
 from ocp.problem.constraint import Box
 from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 
-_OPTIONS = {
-    "print_time": False,
-    "show_eval_warnings": False,
+_OPTIONS = QUIET | {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.max_iter": 100,
@@ -92,15 +91,16 @@ class InputLimits:
         if self._columns is not None:
             return self._interval(bounds, at).clip(inside)
         box = self._rows.box
-        found = self._nearest(
-            x0=inside,
-            p=np.concatenate([given, at.x, [at.t], at.p]),
-            lbx=np.asarray(bounds.lower),
-            ubx=np.asarray(bounds.upper),
-            lbg=np.asarray(box.lower),
-            ubg=np.asarray(box.upper),
-        )
-        moved = bounds.clip(np.array(found["x"]).ravel())
+        inputs = {
+            "x0": inside,
+            "p": np.concatenate([given, at.x, [at.t], at.p]),
+            "lbx": bounds.lower,
+            "ubx": bounds.upper,
+            "lbg": box.lower,
+            "ubg": box.upper,
+        }
+        found, _ = self._nearest(inputs)
+        moved = bounds.clip(found["x"])
         return moved if np.isfinite(moved).all() else inside
 
     def _interval(self, bounds: Box, at: Instant) -> Box:
@@ -150,7 +150,7 @@ class InputLimits:
         return structure.argmax(axis=1).tolist()
 
     @cached_property
-    def _nearest(self) -> ca.Function:
+    def _nearest(self) -> BufferedNlp:
         m, p = self.ocp.model, self.ocp.p
         given = ca.SX.sym("given", m.nu)
         program = {
@@ -159,7 +159,7 @@ class InputLimits:
             "f": ca.sumsqr(m.u - given),
             "g": self._rows.expression,
         }
-        return ca.nlpsol("nearest", "ipopt", program, _OPTIONS)
+        return BufferedNlp(ca.nlpsol("nearest", "ipopt", program, _OPTIONS))
 
     def prepare(self) -> None:
         """Build what a step may need, so that no step waits for it."""

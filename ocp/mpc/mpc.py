@@ -1,8 +1,10 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from math import inf
+from threading import Lock
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -55,6 +57,10 @@ class MPC:
 
     After two runs of the solver in a row without a plan that meets the constraints, every other one
     starts cold, as the first step does, since the last plan may mislead it.
+
+    Of several threads that ask for a step each waits for the one before. A copy, also in another
+    process, is built from the options again and goes on from a copy of ``state``; what the
+    solver's program keeps from its runs stays behind.
 
     A plan that took longer than ``budget`` is too late for its step: it is not applied, but kept
     as the last plan of later steps. Source: thesis Algorithm 3,
@@ -115,6 +121,8 @@ class MPC:
     _ladder: FallbackLadder = field(init=False, repr=False)
     # The only part that a step changes.
     state: ControllerState = field(init=False, repr=False)
+    # A step takes the state that the step before it has left.
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
@@ -122,6 +130,11 @@ class MPC:
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
         self.reset()
         self._ladder = self._built()
+
+    def __reduce__(self) -> tuple[Callable[..., "MPC"], tuple[type["MPC"], dict[str, Any], Any]]:
+        """Copy and pickle options and ``state``; the copy builds its own solver."""
+        options = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        return _copied, (type(self), options, self.state)
 
     def _built(self) -> FallbackLadder:
         solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
@@ -180,9 +193,10 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        raised = hasattr(self, "state") and self.state.solver_raised
-        begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
-        self.state = begun._replace(solver_raised=raised)
+        with self._lock:
+            raised = hasattr(self, "state") and self.state.solver_raised
+            begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
+            self.state = begun._replace(solver_raised=raised)
 
     def step(
         self,
@@ -205,9 +219,11 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        if self.state.solver_raised:
-            self._ladder = self._built()
-        report, self.state = self._ladder.step(self.state, x, t, late=late, parameters=parameters)
+        with self._lock:
+            if self.state.solver_raised:
+                self._ladder = self._built()
+            ladder, state = self._ladder, self.state
+            report, self.state = ladder.step(state, x, t, late=late, parameters=parameters)
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)
         return report
@@ -237,3 +253,9 @@ class MPC:
                     f"has {theirs}"
                 )
         return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+
+
+def _copied(kind: type[MPC], options: dict[str, Any], state: ControllerState) -> MPC:
+    controller = kind(**options)
+    controller.state = state
+    return controller

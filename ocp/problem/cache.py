@@ -21,7 +21,7 @@ def once_per_problem(derive: Callable[[OCP], T]) -> Callable[[OCP], T]:
             return kept[ocp]
         except (KeyError, TypeError):  # not yet, or no problem: then there may be no key of it
             check_instance(ocp, OCP, f"{derive.__name__.lstrip('_')}: the problem")
-        kept[ocp] = derive(ocp)
-        return kept[ocp]
+        # Two threads may both derive it; all get the same one.
+        return kept.setdefault(ocp, derive(ocp))
 
     return derived

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_numbers
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_column
+from ocp.problem.portable import Portable
 
 Place = Literal["path", "initial", "terminal"]
 PLACES: tuple[Place, ...] = get_args(Place)
@@ -24,7 +25,7 @@ def check_place(value: object, what: str) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class Box(Portable):
     """Simple bounds ``lower <= v <= upper``; a number holds for every component.
 
     Args:
@@ -71,7 +72,7 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
-class Constraint:
+class Constraint(Portable):
     """``lower <= expression <= upper`` at a place of the trajectory.
 
     Args:

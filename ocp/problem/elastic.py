@@ -20,6 +20,7 @@ import numpy as np
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
+from ocp.problem.portable import Portable
 from ocp.problem.scaled import sizes_of
 
 # Weight of a violation of one nominal size all along, relative to the nominal cost.
@@ -35,7 +36,7 @@ def elastic(ocp: OCP) -> "Elastic | None":
 
 
 @dataclass(frozen=True, eq=False)
-class Elastic:
+class Elastic(Portable):
     """A problem that no trajectory may meet, and the one that it violates least.
 
     Attributes:

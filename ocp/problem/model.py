@@ -14,10 +14,11 @@ from ocp.checks.expressions import (
     element_names,
     refuse_foreign_symbols,
 )
+from ocp.problem.portable import Portable
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Model:
+class Model(Portable):
     r"""A dynamic model, continuous or discrete in time.
 
     .. math:: \dot x = f(x, u, t) \quad (\text{dt is None}), \qquad

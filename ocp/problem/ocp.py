@@ -20,6 +20,7 @@ from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.parameters import Parameter, ParameterValues, Signal
+from ocp.problem.portable import Portable
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
 _ROUNDING = 1e-9
@@ -52,7 +53,7 @@ class FreeTime:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class OCP:
+class OCP(Portable):
     r"""An optimal control problem in Bolza form.
 
     .. math::
@@ -227,6 +228,11 @@ class OCP:
                 "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
             )
         return guess
+
+    def expressions(self) -> list[ca.SX]:
+        """Return all expressions: its own, of the model and of the constraints."""
+        parts = (self.model, *self.constraints, *self.invariants)
+        return [*super().expressions(), *(e for part in parts for e in part.expressions())]
 
     def describe(self) -> str:
         """Return the problem in mathematics, for a person."""

@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance, check_numbers, check_numeric
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_symbols
+from ocp.problem.portable import Portable
 
 # Two grids whose nodes differ by rounding must be taken as the same grid.
 _SAME_NODE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Parameter:
+class Parameter(Portable):
     """A constant of the problem whose value may change from run to run.
 
     Args:
@@ -50,7 +51,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
+class Signal(Portable):
     """A reference sampled over the horizon, at N + 1 equally spaced instants.
 
     Args:

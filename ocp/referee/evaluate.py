@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
+from ocp.checks.interrupts import interruptible
 from ocp.referee.integrate_controls import integrate_controls
 from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
@@ -57,6 +58,7 @@ class Evaluation:
     truth: ReferenceTrajectory
 
 
+@interruptible
 def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
     """Judge a solution by integrating its controls, whatever its solver says.
 

@@ -22,6 +22,8 @@ from ocp.solution.solution import Solution
 _LONGEST_STEP = 0.0437
 _MOST_STEPS = 20_000
 _MOST_STEPS_OF_ALL = 600_000
+# What CVODES says of them, or of the cost, where they raise an exception.
+_OF_THE_DYNAMICS = "RHSFUNC_FAIL"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +83,8 @@ def integrate_implicitly(
         w = control.restarted(w, t[k])
         parameters = steps.p_start[i.start], steps.p_end[i.stop - 1]
         data = np.hstack([size, cost_size, t[k], t[k + 1] - t[k], *parameters, drive[k]])
-        try:
-            # Called by itself: inside another Function CasADi prints the inputs of a failure.
-            found = piece(x0=w / size, p=data)
-        except RuntimeError:  # what CasADi raises for every failure of CVODES
+        found = _integrated(piece, w / size, data)
+        if found is None:
             break
         ends[i] = size * np.array(found["xf"]).T
         costs[i] = cost_size * np.diff(np.array(found["qf"]).ravel(), prepend=0.0)
@@ -93,6 +93,26 @@ def integrate_implicitly(
     x[-1] = ends[-1]
     u_start, u_end = control.along(steps, substeps, drive, x[:-1], ends)
     return Integrated(x[:, :nx], ends[:, :nx], costs, u_start, u_end, ())
+
+
+def _integrated(piece: ca.Function, x0: np.ndarray, p: np.ndarray) -> dict[str, ca.DM] | None:
+    """Return xf and qf of one interval; None where CVODES fails.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C, which CVODES takes for a failure of the dynamics; that failure
+            is the one which does not repeat.
+    """
+    # Called by itself: inside another Function CasADi prints the inputs of a failure.
+    try:
+        return piece(x0=x0, p=p)
+    except RuntimeError as error:  # what CasADi raises for every failure of CVODES
+        if _OF_THE_DYNAMICS not in str(error):
+            return None
+    try:
+        piece(x0=x0, p=p)
+    except RuntimeError:
+        return None
+    raise KeyboardInterrupt
 
 
 @dataclass(frozen=True, eq=False)

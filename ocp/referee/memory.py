@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
+from threading import Lock
 from typing import TypeVar
 
 from ocp.problem.cache import once_per_problem
@@ -26,16 +27,20 @@ def remembered(
     def empty(ocp: OCP) -> OrderedDict[tuple, T]:
         return OrderedDict()
 
-    kept = once_per_problem(empty)
+    kept, lock = once_per_problem(empty), Lock()
 
     def found(solution: Solution, tolerance: float) -> T:
         results, key = kept(solution.problem), _numbers(solution, tolerance)
-        if key not in results:
-            results[key] = judge(solution, tolerance)
-        results.move_to_end(key)
-        if len(results) > _KEPT:
-            results.popitem(last=False)
-        return results[key]
+        with lock:
+            if key in results:
+                results.move_to_end(key)
+                return results[key]
+        judged = judge(solution, tolerance)  # takes long: other threads need not wait for it
+        with lock:
+            results[key] = judged
+            if len(results) > _KEPT:
+                results.popitem(last=False)
+        return judged
 
     return found
 

@@ -17,6 +17,7 @@ from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
+from ocp.problem.portable import without_caches
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
@@ -141,6 +142,10 @@ class Solution:
             raise ProblemError(f"solution: breaks = {breaks}, they must increase from 0 to {last}")
         pieces = len(breaks) - 1
         return max(1, len(self.u) // pieces) * pieces
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is copied and pickled: the fields."""
+        return without_caches(self)
 
     def __repr__(self) -> str:
         """Return one line: what was solved, how it ended, the cost as the solver computes it."""

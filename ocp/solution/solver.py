@@ -1,7 +1,8 @@
 """The interface of every solver: build once, run often."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
@@ -9,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance
+from ocp.checks.interrupts import interruptible
 from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
+from ocp.problem.portable import Portable
 from ocp.solution.solution import Solution
 
 
@@ -44,7 +47,7 @@ class Program(ABC):
         parameters: Mapping[str, ArrayLike] | None = None,
         guess: InitialGuess | None = None,
     ) -> Solution:
-        """Solve for these data.
+        """Solve for these data. Of several threads that ask, each waits for the one before.
 
         Args:
             x0: start (nx,), a guess of it where the start is free; default: the problem's.
@@ -58,10 +61,11 @@ class Program(ABC):
 
         Raises:
             ProblemError: if the data do not fit the problem.
+            KeyboardInterrupt: after Ctrl-C; the program can be run again.
         """
 
 
-class Solver(ABC):
+class Solver(Portable, ABC):
     """A method with its options: a frozen dataclass whose fields are typed."""
 
     @abstractmethod
@@ -115,6 +119,31 @@ class Solver(ABC):
         return self
 
 
+@dataclass(frozen=True, eq=False)
+class BuiltProgram(Program):
+    """A program that its solver can build again.
+
+    So copies and pickles are made, in another process too: of options and problem. What a program
+    keeps from its runs, such as an answer to start the next one from, stays behind.
+
+    Attributes:
+        solver: the options.
+        ocp: the problem.
+    """
+
+    solver: Solver
+    ocp: OCP
+
+    def __reduce__(self) -> tuple[Callable[..., Program], tuple[Solver, OCP]]:
+        """Return what builds it again."""
+        return _built, (self.solver, self.ocp)
+
+
+def _built(solver: Solver, ocp: OCP) -> Program:
+    return solver.prepare(ocp)
+
+
+@interruptible
 def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
     """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
 

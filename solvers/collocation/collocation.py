@@ -36,6 +36,7 @@ from solvers.direct.first_trajectory import (
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_outcome import NlpOutcome
 from solvers.direct.nlp_run import NlpRun
+from solvers.direct.weak_method import weak_method
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,7 @@ class CollocationProgram(MethodProgram):
             transcription=self.transcription,
             nlp=self.nlp,
             accuracy=self.solver.accuracy,
-            state_error=self._state_error,
+            state_error=weak_method(self._state_error),
             feasibility_restoration=self.solver.feasibility_restoration,
         )
 

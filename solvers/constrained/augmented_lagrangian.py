@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ocp import OCP, InitialGuess, ProblemError, Program, Solution, Solver, UnsupportedProblem
 from ocp.internal import (
     ACCURACY,
+    BuiltProgram,
     RunData,
     ScalingSolver,
     check_instance,
@@ -123,18 +124,15 @@ class AugmentedLagrangian(ScalingSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class AugmentedLagrangianProgram(Program):
+class AugmentedLagrangianProgram(BuiltProgram):
     """A relaxed problem, built by the inner solver.
 
     Attributes:
-        solver: the options.
-        ocp: the problem.
         relaxed: the problem without its constraints.
         inner: the program of the inner solver.
     """
 
     solver: AugmentedLagrangian
-    ocp: OCP
     relaxed: RelaxedProblem
     inner: Program
 

@@ -24,6 +24,7 @@ from ocp import (
     evaluate,
 )
 from ocp.internal import (
+    BuiltProgram,
     Epigraph,
     ScalingSolver,
     check_instance,
@@ -106,18 +107,15 @@ class BetweenNodes(ScalingSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class BetweenNodesProgram(Program):
+class BetweenNodesProgram(BuiltProgram):
     """A tightened problem, built by the inner solver.
 
     Attributes:
-        solver: the options.
-        ocp: the problem.
         rows: its path constraints and state bounds.
         inner: the program of the tightened problem.
     """
 
     solver: BetweenNodes
-    ocp: OCP
     rows: StandardForm
     inner: Program
 

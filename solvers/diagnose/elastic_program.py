@@ -1,24 +1,21 @@
 """The elastic problem: least violation of constraints, and the fewest that exclude each other."""
 
 from collections.abc import Iterable
-from contextlib import redirect_stderr
 from dataclasses import dataclass
 from functools import cached_property
-from io import StringIO
 
 import casadi as ca
 import numpy as np
+
+from ocp.internal import QUIET, BufferedNlp
 
 # A constraint violated by more than this, relative to its size, counts as violated.
 VIOLATED = 1e-5
 # Weight of the distance from the first iterate, which picks one of many answers. The penalty on
 # the slack is exact, so that what can be met has none.
 _NEAR = 1e-5
-_OPTIONS = {
+_OPTIONS = QUIET | {
     "expand": True,
-    "print_time": False,
-    "error_on_fail": False,
-    "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.max_iter": 120,
@@ -99,7 +96,7 @@ class ElasticProgram:
         return np.array([d.size for d in self.demands])
 
     @cached_property
-    def _nlp(self) -> ca.Function:
+    def _nlp(self) -> BufferedNlp:
         s = ca.MX.sym("s", len(self.demands))
         # Of a single demand, a list of indices would be a row.
         slack = ca.vec(s[[int(i) for i in self.owner]])
@@ -111,7 +108,7 @@ class ElasticProgram:
             "f": ca.dot(s, ca.DM(1.0 / self._sizes)) + _NEAR * ca.sumsqr(apart),
             "g": ca.vertcat(self.hard, self.rows + slack, self.rows - slack),
         }
-        return ca.nlpsol("elastic", "ipopt", nlp, _OPTIONS)
+        return BufferedNlp(ca.nlpsol("elastic", "ipopt", nlp, _OPTIONS))
 
     def solve(
         self,
@@ -125,25 +122,24 @@ class ElasticProgram:
         on = np.isin(self.owner, kept)
         gives = np.isin(np.arange(len(self.demands)), kept if soft is None else list(soft))
         many, zeros = np.full(len(on), np.inf), np.zeros(self.hard.numel())
-        # CasADi warns of multipliers that are not finite, also with warnings off.
-        with redirect_stderr(StringIO()):
-            answer = self._nlp(
-                x0=np.append(w0, np.where(gives, self._sizes, 0.0)),
-                p=np.append(p, w0),
-                lbx=np.append(self.box[0], np.zeros(len(gives))),
-                ubx=np.append(self.box[1], np.where(gives, np.inf, 0.0)),
-                lbg=np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),
-                ubg=np.concatenate([zeros, many, np.where(on, self.upper, np.inf)]),
-            )
-        values, rows = np.array(answer["x"]).ravel(), self.rows.numel()
-        weights = np.array(answer["lam_g"]).ravel()[self.hard.numel() :].reshape(2, rows)
+        inputs = {
+            "x0": np.append(w0, np.where(gives, self._sizes, 0.0)),
+            "p": np.append(p, w0),
+            "lbx": np.append(self.box[0], np.zeros(len(gives))),
+            "ubx": np.append(self.box[1], np.where(gives, np.inf, 0.0)),
+            "lbg": np.concatenate([zeros, np.where(on, self.lower, -np.inf), -many]),
+            "ubg": np.concatenate([zeros, many, np.where(on, self.upper, np.inf)]),
+        }
+        answer, stats = self._nlp(inputs)
+        values, rows = answer["x"], self.rows.numel()
+        weights = answer["lam_g"][self.hard.numel() :].reshape(2, rows)
         finite = np.isfinite(values).all() and np.isfinite(weights).all()
         split = len(values) - len(gives)
         return ElasticSolution(
             w=values[:split],
             slack=np.maximum(values[split:], 0.0),
             weight=np.abs(weights).sum(axis=0),
-            found=bool(self._nlp.stats()["success"] and finite),
+            found=bool(stats["success"] and finite),
         )
 
     def excess(self, answer: ElasticSolution) -> np.ndarray:

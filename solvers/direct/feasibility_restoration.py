@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp.internal import ConstraintRow
+from ocp.internal import QUIET, BufferedNlp, ConstraintRow
 from solvers.direct.nlp_backends import NlpResult
 from solvers.direct.transcribed_problem import TranscribedProblem
 
@@ -59,7 +59,7 @@ class FeasibilityRestoration:
         return self.transcription.is_later_state
 
     @cached_property
-    def _nlp(self) -> ca.Function:
+    def _nlp(self) -> BufferedNlp:
         """The elastic problem with its solver; built at the first use, which is rare."""
         program = self.transcription.program
         w, g, s = program["x"], program["g"], ca.MX.sym("s")
@@ -69,17 +69,15 @@ class FeasibilityRestoration:
         hard = [int(i) for i in np.flatnonzero(~self._soft)]
         relaxed = ca.vertcat(g[hard], g[soft] + s, g[soft] - s, w[states] + s, w[states] - s)
         nlp = {"x": ca.vertcat(w, s), "f": s + _TIE_BREAK * program["f"], "g": relaxed}
-        options = {
-            "print_time": False,
-            "error_on_fail": False,
-            "show_eval_warnings": False,
+        options = QUIET | {
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
             "ipopt.max_iter": 300,
         }
         if self.time_limit < np.inf:
             options["ipopt.max_wall_time"] = self.time_limit
-        return ca.nlpsol("elastic", "ipopt", {**nlp, "p": program["p"]}, options)
+        function = ca.nlpsol("elastic", "ipopt", {**nlp, "p": program["p"]}, options)
+        return BufferedNlp(function)
 
     def least_violating(
         self, w0: np.ndarray, bounds: dict[str, np.ndarray], p: np.ndarray
@@ -97,15 +95,16 @@ class FeasibilityRestoration:
         ubg = [bounds["ubg"][~soft], inf_soft, bounds["ubg"][soft]]
         lbg += [bounds["lbx"][states], -inf_states]
         ubg += [inf_states, bounds["ubx"][states]]
-        solution = self._nlp(
-            x0=np.append(w0, 1.0),
-            p=p,
-            lbx=np.append(np.where(states, -np.inf, bounds["lbx"]), 0.0),
-            ubx=np.append(np.where(states, np.inf, bounds["ubx"]), np.inf),
-            lbg=np.concatenate(lbg),
-            ubg=np.concatenate(ubg),
-        )
-        w, stats = np.array(solution["x"]).ravel()[:-1], self._nlp.stats()
+        inputs = {
+            "x0": np.append(w0, 1.0),
+            "p": p,
+            "lbx": np.append(np.where(states, -np.inf, bounds["lbx"]), 0.0),
+            "ubx": np.append(np.where(states, np.inf, bounds["ubx"]), np.inf),
+            "lbg": np.concatenate(lbg),
+            "ubg": np.concatenate(ubg),
+        }
+        solution, stats = self._nlp(inputs)
+        w = solution["x"][:-1]
         if not stats["success"] or not np.isfinite(w).all():
             return None
         cost, g = (np.array(value).ravel() for value in self._values(w, p))

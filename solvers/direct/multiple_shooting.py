@@ -26,6 +26,7 @@ from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
 from solvers.direct.nlp_outcome import NlpOutcome
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
+from solvers.direct.weak_method import weak_method
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,7 @@ class MultipleShootingProgram(MethodProgram):
             transcription=self.transcription,
             nlp=self.nlp,
             accuracy=self.solver.accuracy,
-            state_error=self._integration_error,
+            state_error=weak_method(self._integration_error),
             feasibility_restoration=self.solver.feasibility_restoration,
         )
 

@@ -5,22 +5,32 @@ run of it returns, with finite numbers only but for the cost.
 """
 
 import warnings
-from contextlib import nullcontext, redirect_stderr
 from dataclasses import dataclass
-from io import StringIO
+from functools import cached_property
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from ocp import UnsupportedProblem, Work
-from ocp.internal import Transcription, check_choice, check_flag, check_positive, check_whole
+from ocp.internal import (
+    QUIET,
+    BufferedNlp,
+    Transcription,
+    check_choice,
+    check_flag,
+    check_positive,
+    check_whole,
+)
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
     SubprocessFunction,
     SubprocessLost,
 )
 from solvers.direct.transcribed_problem import TranscribedProblem
+
+# Beyond this a number counts as not finite.
+_HUGE = 1e300
 
 
 @dataclass(frozen=True)
@@ -66,9 +76,7 @@ class NlpBackend:
             UnsupportedProblem: for what fatrop cannot treat.
         """
         own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
-        common = {
-            "error_on_fail": False,
-            "show_eval_warnings": False,
+        common = QUIET | {
             "print_time": self.verbose,
             f"{self.name}.print_level": 5 if self.verbose else 0,
             f"{self.name}.max_iter": self.max_iterations,
@@ -104,6 +112,7 @@ class NlpBackend:
             "structure_detection": "auto",
             "equality": [row.is_equation for row in transcription.rows],
             "fatrop.tolerance": self.tolerance,
+            "cache": {"nlp_grad": _clamped_values(transcription)},
         }
 
 
@@ -131,27 +140,23 @@ class Nlp:
         """
         inputs = {"x0": w0, "p": p, **bounds}
         try:
-            raw, stats = self.subprocess(inputs) if self.subprocess else self._evaluate(inputs)
+            raw, stats = self.subprocess(inputs) if self.subprocess else self._here(inputs)
         except RuntimeError:  # fatrop throws where functions are not finite
             stats = {"return_status": "it threw an exception", "success": False}
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         except SubprocessLost as loss:
             stats = {"return_status": str(loss), "success": False}
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats, is_lost=True)
-        if not all(np.isfinite(raw[name]).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
+        if not all((np.abs(raw[name]) < _HUGE).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         # An interior point may violate a bound by rounding; the result does not.
         w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
         return NlpResult(w, float(raw["f"][0]), raw["g"], raw["lam_x"], raw["lam_g"], stats)
 
-    def _evaluate(
-        self, inputs: dict[str, np.ndarray]
-    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Run it in this process."""
-        # CasADi warns of multipliers that are not finite; no option turns that off.
-        with nullcontext() if self.backend.verbose else redirect_stderr(StringIO()):
-            raw = {name: np.array(value).ravel() for name, value in self.function(**inputs).items()}
-        return raw, self.function.stats()
+    @cached_property
+    def _here(self) -> BufferedNlp:
+        """What runs it in this process."""
+        return BufferedNlp(self.function)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +220,22 @@ class NlpResult:
     def history(self, name: str) -> np.ndarray:
         """Return a quantity per iteration; empty where the backend records none."""
         return np.array((self.stats.get("iterations") or {}).get(name, []))
+
+
+def _clamped_values(transcription: TranscribedProblem) -> ca.Function:
+    """Return cost, constraints and their gradients, as fatrop ends with them; NaN is -1e300.
+
+    Where one of them is not finite CasADi prints a warning, and no option turns that off.
+    """
+    program = transcription.program
+    nlp = ca.Function("nlp", program, ["x", "p"], ["f", "g"])
+    names = ["x", "p", "lam:f", "lam:g"], ["f", "g", "grad:gamma:x", "grad:gamma:p"]
+    exact = nlp.factory("exact", *names, {"gamma": ["f", "g"]})
+    inputs = exact.mx_in()
+    f, g, *gradients = exact.call(inputs)
+    values = [ca.fmin(ca.fmax(value, -_HUGE), _HUGE) for value in (f, g)]
+    own_names = exact.name_in(), exact.name_out()
+    return ca.Function("nlp_grad", inputs, [*values, *gradients], *own_names)
 
 
 def _refuse_for_fatrop(transcription: Transcription) -> None:

@@ -21,6 +21,8 @@ _SERVER = Path(__file__).with_name("subprocess_server.py")
 _SINGLE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 # Start-up timeout of the server [s].
 _START = 60.0
+# So long after its limit a process that has not ended itself, since it is stopped, is ended [s].
+_GRACE = 0.5
 # Longest time limit that an alarm of the kernel accepts, with a margin [s].
 _LONGEST = 1e6
 #: Whether this system has fork and alarms of the kernel.
@@ -39,8 +41,9 @@ class SubprocessFunction:
 
     An iteration limit, or a clock in this process, cannot end compiled third-party code that
     loops inside one iteration. ``python -m benchmarks arm-speed --only-driver`` shows how much
-    longer a call takes than in this process; the first one takes some tenths of a second more.
-    A call after a lost one is not slower.
+    longer a call takes than in this process. Its process is started at once, which takes some
+    tenths of a second, and ends with it. A call after a lost one is not slower, unless its process
+    was stopped or interrupted.
 
     Args:
         function: a Function that can be pickled.
@@ -54,7 +57,6 @@ class SubprocessFunction:
     def __init__(self, function: ca.Function, seconds: float, *, verbose: bool = False) -> None:
         """Start the process."""
         self.function, self.seconds, self.verbose = function, min(seconds, _LONGEST), verbose
-        self._finish: Callable[[], object] | None = None
         self._lock = Lock()
         self._start()
 
@@ -68,6 +70,7 @@ class SubprocessFunction:
         Raises:
             RuntimeError: where the Function does.
             SubprocessLost: if the call took too long, or its process ended by itself.
+            KeyboardInterrupt: after Ctrl-C; the process is ended.
         """
         if self._owner != os.getpid():  # after a fork: process and lock are the parent's
             self._lock = Lock()
@@ -84,29 +87,32 @@ class SubprocessFunction:
 
     def _request(self, inputs: Inputs) -> Any:
         """Return the outputs and statistics, an exception, or the signal that ended the process."""
-        if self._replies < self._requests:  # the last call was interrupted or lost
+        if not self._finish.alive:  # the last call was interrupted, or the process lost in it
             self._start()
         self._requests += 1
-        number, reply = 0, None
+        number, reply, answered = 0, None, False
         try:
             self._pipe.send((self._requests, inputs))
             # Replies are numbered: if the process died between two calls, this call takes the
             # notice of that for its own loss, and its reply must not be taken by the next one.
             while number not in (self._requests, None):
-                if not self._pipe.poll(self.seconds + _START):
-                    raise SubprocessLost(
-                        f"did not return within {self.seconds:g} s, nor did its process"
-                    )
-                number, reply = self._pipe.recv()
+                number, reply = self._reply(self.seconds + _GRACE)
+            answered = True
         except (EOFError, ConnectionError):
             raise SubprocessLost("ended with its process") from None
-        self._replies = self._requests
+        finally:
+            if not answered:  # after Ctrl-C too
+                self._finish()
         return reply
 
+    def _reply(self, seconds: float) -> tuple[int | None, Any]:
+        """Return the next reply with its number, or raise ``SubprocessLost`` after a while."""
+        if self._pipe.poll(seconds):
+            return self._pipe.recv()
+        raise SubprocessLost(f"did not return within {self.seconds:g} s")
+
     def _start(self) -> None:
-        """Start a process, and end the previous one if there is one."""
-        if self._finish:
-            self._finish()
+        """Start a process."""
         path = os.pathsep.join(entry for entry in sys.path if entry)
         printed = None if self.verbose else subprocess.DEVNULL
         self._pipe, theirs = Pipe()
@@ -122,10 +128,12 @@ class SubprocessFunction:
                 start_new_session=True,
             )
         self.process, self._owner = process.pid, os.getpid()
-        self._requests = self._replies = 0
+        self._requests = 0
         self._finish = finalize(self, _end, process, self._pipe, self._owner)
-        with suppress(ConnectionError):  # it died at once: the first call reports that
+        # If it dies at once the first call reports that.
+        with suppress(EOFError, ConnectionError, SubprocessLost):
             self._pipe.send((self.function, self.seconds))
+            self._reply(_START)
 
 
 def _end(process: subprocess.Popen[bytes], pipe: Connection, owner: int) -> None:

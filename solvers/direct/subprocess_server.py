@@ -2,8 +2,9 @@
 
 Run as a file, so that it imports CasADi and nothing of this package; its argument is the file
 descriptor of an open socket. In: the pair of Function and seconds, then for each call its number
-and a dictionary of inputs. Out: that number, and ``(outputs, stats)`` or the exception; or None,
-and the name of the signal that ended the child that evaluates.
+and a dictionary of inputs. Out: 0 as soon as it is ready, then for each call that number, and
+``(outputs, stats)`` or the exception; or None, and the name of the signal that ended the child that
+evaluates.
 """
 
 import os
@@ -26,6 +27,7 @@ def main() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
     pipe = Connection(int(sys.argv[1]))
     function, seconds = pipe.recv()
+    pipe.send((0, None))
     while True:
         child = os.fork()
         if not child:

@@ -26,6 +26,7 @@ from ocp.internal import (
     check_instance,
     check_not_negative,
     check_whole,
+    interruptible,
 )
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
@@ -99,6 +100,7 @@ class Schuetz(ScalingSolver):
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=compiled or self.compiled, judged=False)
 
+    @interruptible
     def build(self, ocp: OCP) -> Program:
         """Build it; a fixed step has units, and is taken in those of the problem as written."""
         return self.prepare(ocp) if isinstance(self.step, FixedStep) else super().build(ocp)

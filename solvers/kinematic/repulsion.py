@@ -7,12 +7,12 @@ import casadi as ca
 import numpy as np
 
 from ocp import ProblemError
-from ocp.internal import check_instance, check_positive
+from ocp.internal import Portable, check_instance, check_positive
 from solvers.kinematic.task import Task, as_column
 
 
 @dataclass(frozen=True)
-class Repulsion:
+class Repulsion(Portable):
     r"""How fast to move away from an obstacle at a distance d, and from where on.
 
     .. math::

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import ProblemError
+from ocp.internal import Portable
 
 Expression = ca.SX | ArrayLike
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Task:
+class Task(Portable):
     r"""Manipulation variables r = f(q, t) and the velocity that is wanted of them.
 
     .. math:: J \dot q = \dot r - \frac{\partial f}{\partial t}, \qquad

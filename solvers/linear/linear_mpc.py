@@ -135,7 +135,7 @@ class _Verdict(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearMPCProgram(MethodProgram):
-    """A quadratic program with its backend; one run at a time.
+    """A quadratic program with its backend; one run at a time. A copy starts its backend afresh.
 
     Attributes:
         lq: the problem as arrays.

@@ -21,6 +21,7 @@ from ocp.internal import (
     RunData,
     RunResult,
     check_choice,
+    interruptible,
 )
 from solvers.linear import regulator_gains as recursion
 
@@ -48,6 +49,7 @@ class Riccati(MethodSolver):
         super().__post_init__()
         check_choice(self.horizon, ("finite", "infinite"), "Riccati: horizon")
 
+    @interruptible
     def build(self, ocp: OCP) -> "RiccatiProgram":
         """Read the matrices; where they are constant, do the recursion."""
         problem = with_stationary_end(ocp) if self.horizon == "infinite" else ocp

@@ -1,7 +1,9 @@
 """Generalised predictive control: a control law for a transfer function with dead time."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -145,6 +147,12 @@ class GPCLaw:
     options: GPC
     prediction: CarimaPrediction
     backend: QpBackend
+    # The backend starts from its last answer.
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
+
+    def __reduce__(self) -> tuple[Callable[..., "GPCLaw"], tuple[GPC, CarimaModel]]:
+        """Copy and pickle options and model; what the backend knows stays behind."""
+        return GPC.build, (self.options, self.prediction.model)
 
     @cached_property
     def gains(self) -> np.ndarray:
@@ -188,7 +196,8 @@ class GPCLaw:
         slack = _MET * (1.0 + np.abs(rows))
         status, message = Status.SOLVED, ""
         if np.any(rows < lower - slack) or np.any(rows > upper + slack):
-            plan, status, message = self._constrained(miss, lower, upper)
+            with self._lock:
+                plan, status, message = self._constrained(miss, lower, upper)
         if status is Status.SOLVED:
             # Rounding must not leave the bounds of what is applied.
             low, high = self._first(last)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ocp import OCP, RK4, InitialGuess, Integrator, Status, Work
 from ocp.internal import (
+    QUIET,
     MethodProgram,
     RunData,
     RunResult,
@@ -79,10 +80,7 @@ class Greedy(ScalingSolver):
 
 
 def _options(solver: Greedy) -> dict[str, Any]:
-    return {
-        "error_on_fail": False,
-        "show_eval_warnings": False,
-        "print_time": False,
+    return QUIET | {
         # Its only check that the toolkit has not made itself prints a warning.
         "inputs_check": False,
         "ipopt.print_level": 0,

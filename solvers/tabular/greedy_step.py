@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Box
-from ocp.internal import ConstraintRows, Stage
+from ocp.internal import BufferedNlp, ConstraintRows, Stage
 
 # Beyond this a constraint counts as violated, whatever the backend says.
 _VIOLATED = 1e-6
@@ -41,19 +41,18 @@ class OneStep:
         rows: what each constraint is.
     """
 
-    nlp: ca.Function
+    nlp: BufferedNlp
     values: ca.Function
     rows: ConstraintRows
 
     def solve(self, u: np.ndarray, data: np.ndarray, box: Box) -> StepControl:
         """Return the best control of a step, from a first guess of it."""
-        limits = {"lbx": np.asarray(box.lower), "ubx": np.asarray(box.upper)}
+        limits = {"lbx": box.lower, "ubx": box.upper}
         rows = self.rows.box
-        limits |= {"lbg": np.asarray(rows.lower), "ubg": np.asarray(rows.upper)}
-        answer: Any = self.nlp(x0=u, p=data, **limits)
-        found = np.array(answer["x"]).ravel()
+        limits |= {"lbg": rows.lower, "ubg": rows.upper}
+        answer, stats = self.nlp({"x0": u, "p": data, **limits})
+        found = answer["x"]
         g = np.array(self.values(found, data)).ravel()
-        stats = self.nlp.stats()
         ended = (
             bool(stats.get("success")),
             str(stats.get("return_status", "")),
@@ -92,7 +91,7 @@ def one_step(ocp: OCP, stage: Stage, options: dict[str, Any], *, last: bool) -> 
     g = ca.vertcat(ca.SX(0, 1), *imposed)
     nlp = ca.nlpsol("step", "ipopt", {"x": u, "f": cost, "g": g, "p": data}, options)
     function = ca.Function("rows", [u, data], [ca.densify(g)])
-    return OneStep(nlp, function, rows)
+    return OneStep(BufferedNlp(nlp), function, rows)
 
 
 def _rows(ocp: OCP, *, last: bool) -> ConstraintRows:

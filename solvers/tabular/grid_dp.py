@@ -25,6 +25,7 @@ from ocp.internal import (
     check_instance,
     check_not_negative,
     check_whole,
+    interruptible,
 )
 from solvers.tabular.bellman import Bellman, ValueFunction
 from solvers.tabular.grid_functions import GridFunctions
@@ -101,6 +102,7 @@ class GridDP(MethodSolver):
         """By how much a terminal constraint may be missed."""
         return self.terminal_slack
 
+    @interruptible
     def build(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
         check_instance(ocp, OCP, "GridDP: the problem")

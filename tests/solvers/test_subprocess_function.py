@@ -6,7 +6,7 @@ import os
 import pickle
 import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from benchmarks.mpc.fault_problems import arm
-from ocp import Compiler, ProblemError, Status
+from ocp import MPC, Compiler, ProblemError, Status
 from solvers import Collocation, MultipleShooting
 from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.direct.subprocess_function import (
@@ -173,6 +173,22 @@ def test_after_an_interruption_the_next_answer_is_its_own(moody: ca.Function) ->
 
 
 @apart
+def test_a_process_that_is_stopped_is_given_up(
+    moody: ca.Function, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own alarm does not reach it; and the time that it may take to start is over."""
+    function = SubprocessFunction(moody, 0.2)
+    monkeypatch.setattr("solvers.direct.subprocess_function._START", 1e6)
+    process = function.process
+    os.killpg(process, signal.SIGSTOP)
+    with pytest.raises(SubprocessLost, match=r"did not return within 0\.2 s"):
+        called(function, FINE)
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+    assert called(function, FINE) == 2.0
+
+
+@apart
 def test_it_ends_with_its_owner(moody: ca.Function) -> None:
     function = SubprocessFunction(moody, 5.0)
     assert called(function, FINE) == 2.0
@@ -181,6 +197,52 @@ def test_it_ends_with_its_owner(moody: ca.Function) -> None:
     gc.collect()
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
+
+
+@pytest.fixture
+def uncollected() -> Iterator[None]:
+    """What is dropped ends at once, or not at all."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def open_now() -> tuple[set[str], set[str]]:
+    """Children of this process, and what its descriptors are open for."""
+    own = Path("/proc/self")
+    children = own / "task" / str(os.getpid()) / "children"
+    if not children.exists():
+        pytest.skip("this system does not list the children of a process")
+    return set(children.read_text().split()), set(os.listdir(own / "fd"))
+
+
+def builds(count: int) -> None:
+    before = open_now()
+    for k in range(count):
+        solver = MultipleShooting(10, backend="fatrop", time_limit=30.0)
+        if k % 10:
+            program = solver.build(cart())
+        else:
+            program = MPC(ocp=cart(), solver=solver, dt=0.1, compiled=False)
+        if isinstance(program, MPC):
+            program.step([1.0, 0.0], 0.0)
+        elif k % 10 == 1:
+            assert program.run().status is Status.SOLVED
+        assert open_now() != before, "its process is running"
+        del program
+        assert open_now() == before
+
+
+@apart
+def test_a_dropped_program_leaves_nothing(uncollected: None) -> None:
+    builds(20)
+
+
+@apart
+@pytest.mark.slow
+def test_many_dropped_programs_leave_nothing(uncollected: None) -> None:
+    builds(500)
 
 
 @apart

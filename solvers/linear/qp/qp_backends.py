@@ -1,8 +1,10 @@
 """Backends for quadratic programs: OSQP, kept factorised, or any backend of qpsolvers."""
 
 import pkgutil
+import signal
 import warnings
 from abc import ABC, abstractmethod
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +24,11 @@ NEEDS_CURVATURE = frozenset({"quadprog"})
 _MARGIN = 0.1
 # A matrix with more than this part of its entries not zero is given as a dense one.
 _FILLED = 0.2
+# OSQP and SCS take over the signal of Ctrl-C while they run, and give it back; so do the filters of
+# warnings. Two at once would give back each other's: one at a time, in the whole process.
+_ONE_AT_A_TIME = Lock()
+# How these two say that Ctrl-C ended them.
+_INTERRUPTED = "interrupted"
 # What goes wrong inside a backend is its failure, never a sign that it is not installed.
 _INSIDE = (QPError, ArithmeticError, LookupError, RuntimeError, ValueError, TypeError)
 
@@ -85,8 +92,10 @@ class OSQPBackend(QpBackend):
         iterations, word, best = 0, "", None
         for eps, most in self._LADDER:
             self._set(solver, eps, most)
-            result = solver.solve(raise_error=False)
+            with _ONE_AT_A_TIME:
+                result = solver.solve(raise_error=False)
             iterations, word = iterations + int(result.info.iter), str(result.info.status)
+            _pass_on_interrupt(word)
             if "infeasible" in word or not np.isfinite(result.x).all():
                 break
             found = self._refiner.refine(qp, result.x, result.y)
@@ -141,12 +150,13 @@ class NamedBackend(QpBackend):
         if self._rows is None or not self._rows.fit(qp):
             self._rows = _SparseRows(qp, self._takes_sparse(qp))
         try:
-            with warnings.catch_warnings():
+            with _ONE_AT_A_TIME, warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 function = qpsolvers.solvers.solve_function[self._name]
                 found = function(self._rows.problem(qp), verbose=False, **self._options)
         except _INSIDE as error:
             return QpResult(None, None, f"{type(error).__name__} inside the backend: {error}")
+        _pass_on_interrupt(str(found.extras.get("status", "")))
         if found.x is None or not np.isfinite(found.x).all():
             return QpResult(None, None, "no solution found")
         z, y = np.asarray(found.x), self._rows.multipliers(found)
@@ -162,6 +172,12 @@ class NamedBackend(QpBackend):
             return True
         filled = qp.G.nnz > _FILLED * max(1, len(qp.l) * len(qp.g))
         return self._name in qpsolvers.sparse_solvers and not filled
+
+
+def _pass_on_interrupt(word: str) -> None:
+    """Let Ctrl-C, which a backend has kept to itself, do what it would have done."""
+    if word == _INTERRUPTED:
+        signal.raise_signal(signal.SIGINT)
 
 
 class _SparseRows:
