@@ -26,6 +26,7 @@ from solvers.certify.estimates import (
     by_polish,
     by_shooting,
     on_grid,
+    on_points,
 )
 from solvers.certify.global_evidence import (
     EXTREMALS,
@@ -37,6 +38,8 @@ from solvers.certify.global_evidence import (
 from solvers.certify.grid_conditions import CHECKS as GRID
 from solvers.certify.grid_conditions import grid_checks
 from solvers.certify.hamiltonian_check import hamiltonian_check
+from solvers.collocation.collocation import Collocation
+from solvers.direct.multiple_shooting import MultipleShooting
 
 # So many independent methods are compared.
 _METHODS = 2
@@ -105,13 +108,14 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
 
     Methods that differ in what they discretise and solve are taken to the end, as far as they
     apply: indirect multiple shooting, refined collocation, shooting over the arcs that it shows,
-    direct multiple shooting extrapolated over its grids; in discrete time the nonlinear program
-    and a linear method. They share the problem's description, its derivatives (CasADi), a
-    direct answer to start from, for most of them the interior-point method, and the referee who
-    says what their answers cost. The first two have to agree to 8 digits where an extremal is one
-    of them, to 5 where not, and to a thousandth of the cost itself. Then the referee's word on the
-    trajectory, the Hamiltonian, the second-order test, the Karush-Kuhn-Tucker conditions on a grid,
-    and what can be said of the optimum being the global one.
+    direct multiple shooting extrapolated over its grids (where dynamics are too stiff for that,
+    collocation on other points); in discrete time the nonlinear program and a linear method. They
+    share the problem's description, its derivatives (CasADi), a direct answer to start from, for
+    most of them the interior-point method, and the referee who says what their answers cost. The
+    first two have to agree to 8 digits where an extremal is one of them, to 5 where not, and to a
+    thousandth of the cost itself. Then the referee's word on the trajectory, the Hamiltonian, the
+    second-order test, the Karush-Kuhn-Tucker conditions on a grid, and what can be said of the
+    optimum being the global one.
 
     Args:
         solution: near the optimum that is to be certified; of any method.
@@ -121,24 +125,23 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
         the certificate; it says itself whether it holds, and what was not checked.
 
     Raises:
-        UnsupportedProblem: if direct multiple shooting solves the problem on no grid, or no
-            method answers.
+        UnsupportedProblem: if neither direct multiple shooting nor collocation solves the problem,
+            or no method answers.
     """
     effort = effort or CertifyOptions()
     check_instance(solution, Solution, "certify: solution")
     check_instance(effort, CertifyOptions, "certify: effort")
     clock = _Clock(effort.seconds, perf_counter())
-    try:
-        coarse = on_grid(solution, effort.intervals)
-    except NoEstimateError as reason:
-        raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
+    coarse, stiff = _coarse(solution, effort)
     estimates, silent = _estimates(solution, coarse, clock)
     if not estimates:
         why = "; ".join(f"{check.name}: {check.sentence}" for check in silent)
         raise UnsupportedProblem(f"{solution.problem.name}: no method certifies it. {why}")
     best = estimates[0]
     smooth = best.is_extremal
-    on_the_grid = clock.checks(GRID, lambda: grid_checks(coarse))
+    on_the_grid = [Check.skipped(name, stiff) for name in GRID]
+    if not stiff:
+        on_the_grid = clock.checks(GRID, lambda: grid_checks(coarse))
     checks = [
         _agreement(estimates, smooth),
         _relative_agreement(estimates),
@@ -147,9 +150,34 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
         _hamiltonian(best, unique=on_the_grid[0].verdict is Verdict.HOLDS),
         _second_order(best),
         *on_the_grid,
-        *_global(best, effort, len(coarse.t) - 1, clock),
+        *_global(best, effort, _searching(effort, coarse), clock),
     ]
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
+
+
+def _coarse(solution: Solution, effort: CertifyOptions) -> tuple[Solution, str]:
+    """Return a direct answer to start from, and why it is none of shooting where it is none.
+
+    Dynamics that are too fast for the explicit steps of any grid are collocated.
+
+    Raises:
+        UnsupportedProblem: if neither solves the problem.
+    """
+    try:
+        return on_grid(solution, effort.intervals), ""
+    except NoEstimateError as reason:
+        said = f"no grid of explicit steps solves it. {reason}"
+    try:
+        return on_points(solution, effort.intervals), said
+    except (NoEstimateError, UnsupportedProblem):
+        raise UnsupportedProblem(f"{solution.problem.name}: {said}") from None
+
+
+def _searching(effort: CertifyOptions, coarse: Solution) -> MultipleShooting | Collocation:
+    """Return what solves from other starts: what solved from this one."""
+    if coarse.control_kind == "held":
+        return MultipleShooting(len(coarse.t) - 1)
+    return Collocation(effort.intervals)
 
 
 def _estimates(
@@ -168,6 +196,8 @@ def _estimates(
         "arcs": lambda: by_arcs(_piecewise(found)),
         "doubled grids": lambda: by_shooting(coarse),
     }
+    if coarse.control_kind != "held":
+        methods |= {"doubled grids": lambda: by_collocation(coarse, "gauss")}
     if solution.problem.model.is_discrete:
         methods = {
             "nonlinear program": lambda: by_nonlinear_program(coarse),
@@ -195,14 +225,19 @@ def _piecewise(found: list[Estimate]) -> Solution:
     raise NoEstimateError("collocation shows none")
 
 
-def _global(best: Estimate, effort: CertifyOptions, intervals: int, clock: _Clock) -> list[Check]:
+def _global(
+    best: Estimate,
+    effort: CertifyOptions,
+    solver: MultipleShooting | Collocation,
+    clock: _Clock,
+) -> list[Check]:
     """Return the evidence that the optimum is the global one."""
     reason = other_data(best.solution)
     if reason:
         return [Check.skipped(name, reason) for name in (CONVEXITY, STARTS, EXTREMALS)]
     ocp = best.solution.problem
     starts = clock.checks(
-        [STARTS], lambda: [other_starts(best, effort.starts, effort.seed, intervals)]
+        [STARTS], lambda: [other_starts(best, effort.starts, effort.seed, solver)]
     )
     if not effort.enumerate:
         return [convexity(ocp), *starts, Check.skipped(EXTREMALS, "not asked for")]

@@ -10,6 +10,7 @@ from ocp import OCP, Box, Solution, Status, UnsupportedProblem, evaluate
 from solvers.certify.certificate import Estimate
 from solvers.certify.local_error import PARTS, local_error
 from solvers.collocation.collocation import Collocation
+from solvers.collocation.collocation_points import Family
 from solvers.collocation.refine_mesh import refine_mesh
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.polish import polish
@@ -87,19 +88,20 @@ def by_polish(solution: Solution) -> Estimate:
     )
 
 
-def by_collocation(coarse: Solution) -> Estimate:
-    """Return the value of Radau collocation on a mesh refined for the dynamics, then for kinks.
+def by_collocation(coarse: Solution, points: Family = "radau") -> Estimate:
+    """Return the value of collocation on a mesh refined for the dynamics, then for kinks.
 
     The error is the last change of the referee's cost, and what an interior-point method leaves
     between its iterates and active bounds.
 
     Args:
         coarse: where the first mesh starts.
+        points: on each interval.
 
     Raises:
         NoEstimateError: if no mesh is solved.
     """
-    solver = Collocation(intervals=_INTERVALS, tolerance=BARRIER)
+    solver = Collocation(intervals=_INTERVALS, points=points, tolerance=BARRIER)
     try:
         found = refine_mesh(coarse, solver=solver, accuracy=_DEFECT)
     except UnsupportedProblem as reason:
@@ -120,7 +122,7 @@ def by_collocation(coarse: Solution) -> Estimate:
         raise NoEstimateError("collocation: the finer mesh is not solved")
     pieces = len(answer.breaks) - 1
     return Estimate(
-        method=f"Radau collocation, {pieces} intervals",
+        method=f"{points.capitalize()} collocation, {pieces} intervals",
         cost=verdict.cost,
         error=max(change, bias, verdict.cost_error, TOLERANCE * (1.0 + abs(verdict.cost))),
         violation=verdict.violation,
@@ -175,6 +177,15 @@ def on_grid(solution: Solution, intervals: int) -> Solution:
                 raise
 
 
+def on_points(solution: Solution, intervals: int) -> Solution:
+    """Return the answer of collocation, which is implicit.
+
+    Raises:
+        NoEstimateError: if it is not solved.
+    """
+    return _solved(Collocation(intervals, tolerance=BARRIER), solution)
+
+
 def extrapolated(costs: np.ndarray) -> ExtrapolatedCost:
     """Return the limit of costs on grids doubled each time, its error, and how it was found.
 
@@ -213,13 +224,13 @@ def is_steady(costs: Sequence[float] | np.ndarray) -> bool:
     return bool(((ratios >= _LEAST_RATIO) & (ratios <= _MOST_RATIO)).all())
 
 
-def _solved(solver: MultipleShooting, guess: Solution) -> Solution:
+def _solved(solver: MultipleShooting | Collocation, guess: Solution) -> Solution:
     data = guess.data
     program = solver.build(guess.problem)
     answer = program.run(x0=data.x0, t0=data.t0, parameters=guess.parameters, guess=guess)
     if not answer.status.is_success:
         raise NoEstimateError(
-            f"multiple shooting, {solver.intervals} intervals: {answer.status.value}. "
+            f"{type(solver).__name__}, {solver.intervals} intervals: {answer.status.value}. "
             f"{answer.message}"
         )
     return answer

@@ -18,6 +18,7 @@ from ocp import (
 )
 from ocp.internal import RunData
 from solvers.certify.certificate import CONVEXITY, STARTS, Check, Estimate, Verdict
+from solvers.collocation.collocation import Collocation
 from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.reverse.enumerate_extremals import enumerate_extremals
 from solvers.multistart import multistart
@@ -90,12 +91,13 @@ def _least_weight(ocp: OCP) -> float:
     return float(values[0] / max(np.abs(values).max(), np.finfo(float).tiny))
 
 
-def other_starts(best: Estimate, starts: int, seed: int, intervals: int) -> Check:
+def other_starts(
+    best: Estimate, starts: int, seed: int, solver: MultipleShooting | Collocation
+) -> Check:
     """Solve from random controls and fail if any answer is cheaper than the certified one."""
     ocp = best.solution.problem
     if starts < 2:
         return Check.skipped(STARTS, "one start only")
-    solver = MultipleShooting(intervals)
     found = multistart(ocp, solver, starts, seed, violation=_BETWEEN)
     if not found:
         found = multistart(ocp, solver, starts, seed, violation=_LOOSE)
@@ -103,7 +105,7 @@ def other_starts(best: Estimate, starts: int, seed: int, intervals: int) -> Chec
         return Check.skipped(STARTS, f"none of {starts} starts led to a feasible optimum")
     cheapest = found[0].cost
     if _lead(best, cheapest) > _CHEAPER:  # by what the coarse grid violates, perhaps
-        finer = replace(solver, intervals=_FINER * intervals)
+        finer = replace(solver, intervals=_FINER * solver.intervals)
         cheapest = evaluate(solve(ocp, finer, guess=found[0].solution)).cost
     lead = _lead(best, cheapest)
     costs = ", ".join(f"{optimum.cost:.6g} ({optimum.found}x)" for optimum in found[:4])

@@ -4,12 +4,14 @@ from dataclasses import replace
 from importlib import import_module
 from itertools import chain, repeat
 
+import casadi as ca
+import numpy as np
 import pytest
 
 from benchmarks.cases import TEXTBOOK, Case, all_cases
 from models.textbook import bryson_denham, double_integrator_energy
-from ocp import Box, Guess, ProblemError, UnsupportedProblem, evaluate, solve
-from solvers import Certificate, CertifyOptions, MultipleShooting, certify
+from ocp import OCP, Box, Guess, Model, ProblemError, UnsupportedProblem, evaluate, solve
+from solvers import Certificate, CertifyOptions, Collocation, MultipleShooting, certify
 from solvers.certify.certificate import CONVEXITY, STARTS, Estimate, Verdict
 from solvers.certify.certify import RELATIVE
 from solvers.certify.estimates import NoEstimateError, by_polish
@@ -82,7 +84,7 @@ def test_the_wrong_side_of_the_obstacle_is_found_out():
     """From zero controls the direct method ends in a local optimum of arm-034."""
     answer = solve(case("arm-034-sum").build(), MultipleShooting(75)).or_raise()
     best = Estimate("direct", evaluate(answer).cost, 1e-3, 0.0, answer, "")
-    check = other_starts(best, starts=3, seed=0, intervals=40)
+    check = other_starts(best, 3, 0, MultipleShooting(40))
     assert check.verdict is Verdict.FAILS
     certificate = Certificate("arm", (best, best), (check,))
     assert not certificate.holds
@@ -160,3 +162,17 @@ def test_what_no_grid_solves_is_said():
     start = solve(ocp, MultipleShooting(10), guess=Guess(u=[[0.0], [0.0]]))
     with pytest.raises(UnsupportedProblem, match="no grid solves it"):
         certify(start, QUICK)
+
+
+def test_stiff_dynamics_are_certified_by_two_kinds_of_collocation() -> None:
+    """No explicit grid follows a lag of 0.1 ms over a second."""
+    x, y, u = (ca.SX.sym(name) for name in "xyu")
+    lag = Model(name="lag", x=ca.vertcat(x, y), u=u, f=ca.vertcat(u, 1e4 * (x - y)))
+    stiff = OCP(name="lag", model=lag, x0=[1.0, 1.0], horizon=1.0, running_cost=y**2 + u**2)
+    found = certify(solve(stiff, Collocation(25)), CertifyOptions(starts=2))
+    assert found.holds, found
+    assert found.cost == pytest.approx(np.tanh(1.0), rel=1e-3)
+    methods = " ".join(estimate.method for estimate in found.estimates)
+    assert "Radau" in methods
+    assert "Gauss" in methods
+    assert "explicit steps" in str(found)
