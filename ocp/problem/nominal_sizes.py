@@ -86,13 +86,16 @@ class _Equation(NamedTuple):
 def nominal_sizes(ocp: OCP) -> Sizes:
     """Return the nominal sizes of a problem; what the user declared as nominal stays."""
     functions, points = _Functions.of(ocp), _points(ocp)
-    log_sizes = np.zeros(ocp.model.nx + ocp.model.nu + 1)
+    size = ocp.model.nx + ocp.model.nu + 1
+    known = [*_given(ocp), *functions.rate_sizes(points[0])]
+    # Before anything is known of sizes no point lies a size away.
+    at_points = [e for p in points for e in (*functions.equations(p), *functions.of_costs(p))]
+    log_sizes = _solved([*known, *at_points], size)
     for _ in range(_ROUNDS):
-        equations = [*_given(ocp), *functions.rate_sizes(points[0])]
+        equations = [*known, *at_points]
         for point, beside in zip(points, _displaced(ocp, points, np.exp(log_sizes)), strict=True):
-            equations += [*functions.equations(point), *functions.of_costs(point)]
             equations += [*functions.equations(beside), *functions.of_curvature(point, beside)]
-        log_sizes = _solved(equations, len(log_sizes))
+        log_sizes = _solved(equations, size)
     nx = ocp.model.nx
     x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
     if ocp.model.x_nominal is not None:

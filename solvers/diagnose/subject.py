@@ -6,8 +6,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Solution
-from ocp.internal import RunData
+from ocp import OCP, Program, Solution
+from ocp.internal import RunData, scaled
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
 # Random points around the guess, for what must hold everywhere.
@@ -88,10 +88,17 @@ class DiagnosedProblem:
 
     @cached_property
     def trial(self) -> Solution:
-        """The solution of the direct method."""
+        """The solution of the direct method; in sizes of the problem's own where it needs them."""
+        found = self._tried(self.program)
+        if found.status.is_success or scaled(self.ocp) is None:
+            return found
+        again = self._tried(self.solver.build(self.ocp))
+        return again if again.status.is_success else found
+
+    def _tried(self, program: Program) -> Solution:
         guess = self.given if self.given is not None and self.given.status.is_success else None
         values = self.data.values.as_dict()
-        return self.program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)
+        return program.run(x0=self.data.x0, t0=self.data.t0, parameters=values, guess=guess)
 
     @property
     def is_solved(self) -> bool:

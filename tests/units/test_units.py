@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.cases import all_cases
 from models.textbook import goddard, van_der_pol
-from ocp import OCP, Box, Constraint, Model, ProblemError, Solver, Status, evaluate, solve
+from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, Solver, Status, evaluate, solve
 from ocp.internal import MethodProgram
 from ocp.problem.scaled import scaled, sizes_of
 from solvers import (
@@ -16,9 +16,11 @@ from solvers import (
     LinearMPC,
     MultipleShooting,
     StagewiseNewton,
+    diagnose,
     polish,
 )
 from solvers.constrained.between_nodes import BetweenNodesProgram
+from solvers.internal import Cause
 from tests.units.changed_units import Units
 
 # Left out: where the minimum is so flat (fuller, beam: singular arcs) or the grid so coarse
@@ -209,3 +211,51 @@ def test_nominal_sizes_are_positive_numbers(nominal) -> None:
         Model(name="m", x=x, u=u, f=ca.vertcat(x[1], u), x_nominal=nominal)
     with pytest.raises(ProblemError, match="constraint 'c': nominal"):
         Constraint("c", x, 0.0, 0.0, at="terminal", nominal=nominal)
+
+
+def transfer(metre: float, second: float) -> OCP:
+    """The transfer of [Bryson & Ho 1975, 2.5] from the earth's orbit outwards, in given units."""
+    unit, mu = 1.495978707e11, 1.32712440018e20  # [m], [m^3 / s^2]
+    own = np.sqrt(unit**3 / mu)
+    r, v_r, v_t, angle, t = (ca.SX.sym(name) for name in ("r", "v_r", "v_t", "angle", "t"))
+    pull = mu * second**2 / metre**3
+    push = 0.1405 * unit / own**2 * second**2 / metre / (1 - 0.07489 * t * second / own)
+    rates = ca.vertcat(
+        v_r,
+        v_t**2 / r - pull / r**2 + push * ca.sin(angle),
+        -v_r * v_t / r + push * ca.cos(angle),
+    )
+    around = ca.vertcat(v_r, v_t - ca.sqrt(pull / r))
+    return OCP(
+        name="transfer",
+        model=Model(name="ship", x=ca.vertcat(r, v_r, v_t), u=angle, t=t, f=rates),
+        x0=[unit / metre, 0.0, np.sqrt(pull * metre / unit)],
+        horizon=3.3207 * own / second,
+        terminal_cost=-r,
+        constraints=(Constraint("circle", around, 0, 0, at="terminal"),),
+        guess=Guess(u=np.linspace([0.5], [5.5], 50)),
+    )
+
+
+UNIT = 1.495978707e11
+UNITS = [(UNIT, 5022642.891), (UNIT, 86400.0), (UNIT, 1.0), (1e9, 1.0), (1e3, 1.0), (1.0, 1.0)]
+
+
+@pytest.mark.parametrize(("metre", "second"), UNITS)
+def test_an_orbit_in_any_unit(metre: float, second: float) -> None:
+    asked = transfer(metre, second)
+    found = solve(asked, MultipleShooting(60))
+    assert found.status.is_success, found.message
+    assert found.x[-1, 0] * metre / UNIT == pytest.approx(1.52545, rel=1e-5)
+    assert found.iterations < 30
+    assert Cause.UNSOLVED not in [finding.cause for finding in diagnose(asked).findings]
+
+
+@pytest.mark.parametrize(("metre", "second"), UNITS)
+def test_nominal_sizes_follow_the_units(metre: float, second: float) -> None:
+    """The first round looked one unit away from the start, whatever that was."""
+    one, other = (sizes_of(transfer(*units)) for units in (UNITS[0], (metre, second)))
+    length, time = metre / UNITS[0][0], second / UNITS[0][1]
+    scale = np.array([length, length / time, length / time])
+    np.testing.assert_allclose(other.x * scale, one.x, rtol=1e-6)
+    np.testing.assert_allclose(other.u, one.u, rtol=1e-6)
