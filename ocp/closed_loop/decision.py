@@ -37,7 +37,8 @@ class StepReport:
         status: how the solver ended at this step; None where it was not run, or raised.
         message: why the input is not ``OPTIMAL``, in words.
         residual: the solver's optimality residual; inf without a plan of this step.
-        late: whether a new plan came too late for this step.
+        late: whether the time of this step was over: a new plan came too late for it, or there was
+            none to look for another one.
         parameters: values of parameters and samples of signals of the horizon from
             ``applies_at`` on, by name, as the solver gets them.
         parameters_known: False where the controller's ``parameters`` failed; there are none then.

@@ -77,18 +77,24 @@ class ModelRollout:
     def excess(
         self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
     ) -> tuple[float, str]:
-        """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name."""
+        """Return the largest violation along states (N + 1, nx), controls (N, nu), and its name.
+
+        It is relative to the sizes of ``imposed``, where there are any.
+        """
         rows, found = self._rows, [Violation()]
+        sizes = self.imposed.sizes if self.imposed else None
         if rows.states.is_imposed:
             exempt = self._exempt_states[1:]
-            found.append(rows.states.largest_violation(x[1:], t[1:], exempt=exempt))
+            own = sizes and sizes.states
+            found.append(rows.states.largest_violation(x[1:], t[1:], exempt=exempt, sizes=own))
         if rows.controls.is_imposed:
-            found.append(rows.controls.largest_violation(u, t))
+            found.append(rows.controls.largest_violation(u, t, sizes=sizes and sizes.controls))
         if rows.path.is_imposed:
             nodes = np.vstack([p[0], p[1][-1:]])
             values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
-            found.append(rows.path.largest_violation(values, t, exempt=self._exempt))
-        return _in_words(max(found, key=_amount))
+            own = sizes and sizes.path
+            found.append(rows.path.largest_violation(values, t, exempt=self._exempt, sizes=own))
+        return _in_words(max(found, key=_relative))
 
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
         """Return the largest violation of a terminal constraint by a final state (nx,)."""
@@ -96,7 +102,9 @@ class ModelRollout:
         if not terminal:
             return 0.0, ""
         (values,) = self._end(x, t, p)
-        return _in_words(terminal.largest_violation(values.T, np.array([t])))
+        sizes = self.imposed.sizes if self.imposed else None
+        own = sizes and sizes.terminal
+        return _in_words(terminal.largest_violation(values.T, np.array([t]), sizes=own))
 
     @property
     def _rows(self) -> ProblemRows:
@@ -148,8 +156,8 @@ def _compiled_step(ocp: OCP) -> ca.Function:
     return compiled(_step(ocp))
 
 
-_amount = attrgetter("amount")
+_relative = attrgetter("relative")
 
 
 def _in_words(violation: Violation) -> tuple[float, str]:
-    return violation.amount, str(violation)
+    return violation.relative, str(violation)

@@ -79,14 +79,21 @@ class Rollout:
     @property
     def advice(self) -> str:
         """What to change where the loop lived on lower rungs; empty where it did not."""
-        lower = self.counts[InputSource.LEAST_VIOLATING] + self.counts[InputSource.BACKUP]
-        if lower <= _TOLERATED * len(self.sources):
-            return ""
-        return (
-            f"{lower} of {len(self.sources)} steps had no plan that meets the constraints: keep a "
-            "distance from hard limits of states (a priced cushion before them), make them soft, "
-            "or take a longer horizon; the messages say which constraint it was"
-        )
+        counts, few = self.counts, _TOLERATED * len(self.sources)
+        violating, backup = counts[InputSource.LEAST_VIOLATING], counts[InputSource.BACKUP]
+        said = []
+        if violating > few:
+            said.append(
+                f"{violating} of {len(self.sources)} steps had no plan that meets the constraints: "
+                "keep a distance from hard limits of states (a priced cushion before them), make "
+                "them soft, or take a longer horizon; the messages say which constraint it was"
+            )
+        if backup > few:
+            said.append(
+                f"{backup} of {len(self.sources)} steps had no plan at all: the messages say what "
+                "the solver brought instead"
+            )
+        return "; ".join(said)
 
     @property
     def decided_by(self) -> str:

@@ -50,7 +50,8 @@ def with_input_rate(
     def moved(expression: ca.SX | float) -> ca.SX:
         return ca.substitute(ca.SX(expression), m.u, now)
 
-    constraints = [replace(c, expression=moved(c.expression)) for c in ocp.constraints]
+    constraints = [part for c in ocp.constraints for part in _parts(ocp, c)]
+    constraints = [replace(c, expression=moved(c.expression)) for c in constraints]
     if ocp.control_bounds.is_active:
         box = ocp.control_bounds
         bounds = Constraint("control_bounds", now, box.lower, box.upper, limits_input=True)
@@ -68,6 +69,34 @@ def with_input_rate(
         constraints=tuple(constraints),
         guess=None,
     )
+
+
+def _parts(ocp: OCP, c: Constraint) -> list[Constraint]:
+    """Return a constraint in parts that limit the input and that do not.
+
+    What the control was is a state now, so that nothing tells them apart any more.
+    """
+    if c.at != "path":
+        return [c]
+    rows = [row for row in ocp.rows.path.rows if row.name == c.name]
+    limits = np.array([row.kind == "input" for row in rows])
+    if limits.all() or not limits.any():
+        return [replace(c, limits_input=bool(limits.all()))]
+    parts = []
+    for which, name in ((~limits, c.name), (limits, f"{c.name}, input")):
+        chosen = np.flatnonzero(which).tolist()
+        box = np.asarray(c.lower)[chosen], np.asarray(c.upper)[chosen]
+        nominal = None if c.nominal is None else np.asarray(c.nominal)[chosen]
+        parts.append(
+            Constraint(
+                name,
+                c.expression[chosen],
+                *box,
+                nominal=nominal,
+                limits_input=name != c.name,
+            )
+        )
+    return parts
 
 
 def _model(m: Model, before: ca.SX, change: ca.SX) -> Model:

@@ -10,45 +10,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import class_in_words
-from ocp.checks.errors import ProblemError
 from ocp.closed_loop.decision import Decision, InputSource, StepReport
-from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.mpc.backup_selection import Backup
 from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.input_limits import InputLimits, Instant
-from ocp.mpc.plan_check import HorizonParameters, PlanCheck
+from ocp.mpc.plan_check import ROUNDING, HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import InputMap, PlantInput
+from ocp.mpc.step_clock import StepClock
 from ocp.mpc.step_inputs import InputCollector, Parameters, StepInputs, joined
+from ocp.mpc.step_solver import SolvedStep, StepSolver, refusal
 from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
-from ocp.problem.scaled import sizes_of
-from ocp.solution.shifted_plan import ShiftedPlan, plan_controls
+from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
-
-# A plan whose state is further from the measured one, in sizes, is no start for the next.
-_FAR = 100.0
-_NOW = np.zeros(1)
-# Of an instant, relative to the interval.
-_ROUNDING = 1e-6
-
-
-class SolvedStep(NamedTuple):
-    """What the solver returned at one step.
-
-    Attributes:
-        plan: a new plan that meets the constraints, or None.
-        status: how the solver ended; None where it was not run, or raised.
-        message: why there is no plan, or it is not optimal.
-        raised: whether the solver raised something, and is to be built again.
-    """
-
-    plan: Solution | None
-    status: Status | None
-    message: str
-    raised: bool = False
 
 
 class SelectedInput(NamedTuple):
@@ -111,14 +87,27 @@ class FallbackLadder:
         *,
         late: bool | None,
         parameters: Mapping[str, ArrayLike] | None,
+        started: float,
+        broken: str,
     ) -> tuple[StepReport, ControllerState]:
-        """Return a ``Decision``, or a report where no rung holds, and what is known afterwards."""
-        started = perf_counter()
+        """Return a ``Decision``, or a report where no rung holds, and what is known afterwards.
+
+        Args:
+            state: what is known from earlier steps.
+            x: measured state (nx,).
+            t: when it was measured [s].
+            late: whether the step's time is over; None: by the clock.
+            parameters: of the horizon; None: what the controller's own say.
+            started: when the step began, of ``perf_counter`` [s].
+            broken: why the solver could not be built again; empty where it is whole.
+        """
         inputs = self._inputs.collect(state, x, t, parameters)
-        solved = self._solve(inputs, state)
-        used = perf_counter() - started
-        is_late = solved.plan is not None and (used > self.budget if late is None else late)
-        selected, reason = self._descend(inputs, state, solved, used if is_late else None)
+        solver_ran = not inputs.unsolvable
+        inputs = inputs._replace(unsolvable=joined(inputs.unsolvable, broken))
+        solved = self._solver.solve(inputs, state)
+        clock = StepClock(started, self.budget, late)
+        selected, reason = self._descend(inputs, state, solved, clock)
+        is_late = clock.late
         given = None if selected is None else selected.input
         new_plan = solved.plan if is_late else None
         if selected is not None and selected.is_new:
@@ -127,9 +116,9 @@ class FallbackLadder:
         after = state.after(
             given,
             new_plan,
-            solver_ran=not inputs.unsolvable,
+            solver_ran=solver_ran,
             meets_constraints=meets,
-            solver_raised=solved.raised,
+            solver_raised=solved.raised or bool(broken),
         )
         report = StepReport(
             t=inputs.t,
@@ -160,19 +149,12 @@ class FallbackLadder:
         )
 
     def _descend(
-        self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, late: float | None
+        self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, clock: StepClock
     ) -> Rung:
-        """Return the first rung that holds, and why those before it do not.
-
-        Args:
-            inputs: of the step.
-            state: what is known from earlier ones.
-            solved: what the solver returned.
-            late: after how long its plan came, where that was too late for the step [s].
-        """
+        """Return the first rung that holds, and why those before it do not."""
         now, why = Instant(inputs.start, inputs.applies_at, inputs.now), ""
-        if late is not None:
-            why = f"the answer came after {late:.3g} s, too late for its step"
+        if clock.is_over():
+            why = clock.said if solved.plan is not None else ""
         elif solved.plan is not None:
             best = InputSource.OPTIMAL if solved.status is Status.SOLVED else InputSource.FEASIBLE
             selected, why = self._follow(solved.plan, now, best)
@@ -180,46 +162,16 @@ class FallbackLadder:
                 return selected, why
         selected, reason = self._follow_shifted(state.plan, now, inputs.parameters)
         why = joined(why, reason)
-        if selected is None and late is None and not inputs.unsolvable and self.least is not None:
-            selected, reason = self._violate_least(self.least, inputs, state, now)
+        may_violate = self.least is not None and not inputs.unsolvable
+        if selected is None and may_violate and not clock.is_over():
+            selected, reason = self._violate_least(inputs, state, solved, now)
+            if clock.is_over():
+                selected, reason = None, f"the least violating plan: {clock.said}"
             why = joined(why, reason)
         if selected is None:
             selected, reason = self._back_up(state.last_input, now)
             why = joined(why, reason)
         return selected, why
-
-    def _solve(self, inputs: StepInputs, state: ControllerState) -> SolvedStep:
-        """Run the solver, and check that its plan meets the constraints."""
-        if inputs.unsolvable:
-            return SolvedStep(None, None, inputs.unsolvable)
-        start, t, p = inputs.start, inputs.applies_at, inputs.parameters
-        guess = self._warm_start(state, start, t)
-        try:
-            plan = _plan_of(self.program, inputs, guess)
-        except CALLBACK_ERRORS as error:
-            said = f"{type(error).__name__} inside the solver: {error}"
-            return SolvedStep(None, None, said, raised=True)
-        excess, worst = self._check.new_plan(plan, start, t, p)
-        if excess > self.tolerance:
-            return SolvedStep(None, plan.status, f"{plan.status.name}: {plan.message or worst}")
-        if plan.status is Status.SOLVED:
-            return SolvedStep(plan, plan.status, "")
-        reason = f"{plan.status.name}: {plan.message or plan.status.value}"
-        return SolvedStep(plan, plan.status, reason)
-
-    def _warm_start(
-        self, state: ControllerState, start: np.ndarray, t: float
-    ) -> InitialGuess | None:
-        """Return the last plan moved to now, unless it is of no use; then where a loop begins."""
-        last = state.plan
-        if last is None or state.cold_start or t < last.t[0]:
-            return self.guess
-        shifted = ShiftedPlan(last, t)
-        expected = shifted.sample("x", _NOW, len(start))[0]
-        # A plan from a wrong measurement, or one that a jump of the state has overtaken.
-        if (np.abs(expected - start) > _FAR * (self._sizes + np.abs(start))).any():
-            return self.guess
-        return shifted
 
     # -- the rungs ---------------------------------------------------------------------------
 
@@ -227,7 +179,7 @@ class FallbackLadder:
         """Follow the last good plan, if its remainder meets the constraints."""
         if plan is None:
             return None, "there is no earlier plan"
-        if now.t < plan.t[0] - _ROUNDING * self.dt:
+        if now.t < plan.t[0] - ROUNDING * self.dt:
             return None, f"time went back to {now.t:.6g} s, the plan begins at {plan.t[0]:.6g} s"
         excess, worst = self._check.remainder(plan, now.x, now.t, p)
         if excess > self.tolerance:
@@ -235,22 +187,30 @@ class FallbackLadder:
         return self._follow(plan, now, InputSource.SHIFTED)
 
     def _violate_least(
-        self, least: Program, inputs: StepInputs, state: ControllerState, now: Instant
+        self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, now: Instant
     ) -> Rung:
-        """Follow the plan that violates the constraints on states least; say by how much."""
-        p, guess = inputs.parameters, self._warm_start(state, now.x, now.t)
-        try:
-            plan = _plan_of(least, inputs, guess)
-        except CALLBACK_ERRORS as error:
-            return None, f"no least violating plan: {type(error).__name__}: {error}"
-        excess, worst = self._check.least_violating(plan, now.x, now.t, p)
-        if excess > self.tolerance:
-            return None, f"no least violating plan: {plan.status.name}: {plan.message or worst}"
+        """Follow the plan that violates the constraints on states least; say by how much.
+
+        That of the solver itself, which nearly met them, may be better than the one at a price.
+        """
+        found, why = self._solver.least_violating(inputs, state)
+        candidates = [plan for plan in (found, solved.rejected) if plan is not None]
+        p, best = inputs.parameters, None
+        for plan in candidates:
+            violation = self._check.violation(plan, now.x, now.t, p)
+            if violation.of_inputs > self.tolerance:
+                if plan is found:
+                    why = f"no least violating plan: {refusal(plan, violation.worst)}"
+            elif best is None or violation.largest < best[1].largest:
+                best = plan, violation
+        if best is None:
+            return None, why
+        plan, violation = best
+        if violation.largest <= self.tolerance:
+            selected, reason = self._follow(plan, now, InputSource.FEASIBLE)
+            return selected, reason or "another plan meets the constraints"
         selected, reason = self._follow(plan, now, InputSource.LEAST_VIOLATING)
-        return (
-            selected,
-            reason or f"no plan meets the constraints; {worst or 'this one nearly does'}",
-        )
+        return selected, reason or f"no plan meets the constraints; {violation.worst}"
 
     def _back_up(self, last: np.ndarray | None, now: Instant) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
@@ -276,14 +236,15 @@ class FallbackLadder:
     ) -> Rung:
         """Move an input into its limits; None if it is not finite, or a plan's and moved far."""
         inside = self._input_limits.nearest(given, now)
-        excess = float(np.abs(given - inside).max())  # not finite where the input is not
+        # Not finite where the input is not.
+        excess = float((np.abs(given - inside) / self._input_sizes).max(initial=0.0))
         if not isfinite(excess):
             return None, f"the input {given} is not finite"
         # One that moves is held at its mean, which a limit that moves may exclude by a little.
         is_held = plan is not None and plan.control_kind == "held"
         if is_held and excess > self.tolerance:
             return None, f"the input {given} leaves its bounds by {excess:.3g}"
-        return SelectedInput(source, inside, excess, plan), ""
+        return SelectedInput(source, inside, excess, plan), self._input_limits.exceeded(inside, now)
 
     @cached_property
     def _inputs(self) -> InputCollector:
@@ -298,8 +259,21 @@ class FallbackLadder:
         )
 
     @cached_property
-    def _sizes(self) -> np.ndarray:
-        return sizes_of(self.ocp).x
+    def _solver(self) -> StepSolver:
+        return StepSolver(
+            ocp=self.ocp,
+            program=self.program,
+            least=self.least,
+            check=self._check,
+            guess=self.guess,
+            tolerance=self.tolerance,
+        )
+
+    @cached_property
+    def _input_sizes(self) -> np.ndarray:
+        """What the input is measured in, (m,)."""
+        sizes = self.imposed.sizes if self.applied.what == "control" else None
+        return np.ones(self.applied.size(self.ocp)) if sizes is None else sizes.controls
 
     @cached_property
     def _check(self) -> PlanCheck:
@@ -313,19 +287,6 @@ class FallbackLadder:
     def _input_limits(self) -> InputLimits:
         return InputLimits(self.ocp, self.applied)
 
-
-def _plan_of(program: Program, inputs: StepInputs, guess: InitialGuess | None) -> Solution:
-    """Run a program for a step; whatever it raises is for the caller.
-
-    Raises:
-        ProblemError: if it returns something else than a solution.
-    """
-    plan = program.run(
-        x0=inputs.start,
-        t0=inputs.applies_at,
-        parameters=inputs.parameters.by_name,
-        guess=guess,
-    )
-    if not isinstance(plan, Solution):
-        raise ProblemError(f"it returned {class_in_words(plan)}, no solution")
-    return plan
+    def prepare(self) -> None:
+        """Build what a step may need, so that no step waits for it."""
+        self._input_limits.prepare()

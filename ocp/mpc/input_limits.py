@@ -90,9 +90,16 @@ class InputLimits:
             return inside
         if self._columns is not None:
             return self._interval(bounds, at).clip(inside)
-        box = self._rows.box
+        # A start at which a slope vanishes, as the middle of a ring, leads nowhere: others may.
+        starts = [inside, *(bounds.clip(inside + step) for step in self._steps)]
+        tried = (self._solved(given, start, at) for start in starts)
+        inputs = (found for found in tried if np.isfinite(found).all())
+        return next((found for found in inputs if self._rows_hold(found, at)), inside)
+
+    def _solved(self, given: np.ndarray, start: np.ndarray, at: Instant) -> np.ndarray:
+        bounds, box = self.applied.box(self.ocp), self._rows.box
         inputs = {
-            "x0": inside,
+            "x0": start,
             "p": np.concatenate([given, at.x, [at.t], at.p]),
             "lbx": bounds.lower,
             "ubx": bounds.upper,
@@ -100,8 +107,14 @@ class InputLimits:
             "ubg": box.upper,
         }
         found, _ = self._nearest(inputs)
-        moved = bounds.clip(found["x"])
-        return moved if np.isfinite(moved).all() else inside
+        return bounds.clip(found["x"])
+
+    def exceeded(self, given: np.ndarray, at: Instant) -> str:
+        """Return which row an input leaves, and by how much, in words; empty where none is left."""
+        if self._rows_hold(given, at):
+            return ""
+        values = self._values(given, at)[None, :]
+        return str(self._rows.largest_violation(values, np.array([at.t])))
 
     def _interval(self, bounds: Box, at: Instant) -> Box:
         """Return bounds of the input that rows of one control each leave, within its own."""
@@ -131,6 +144,11 @@ class InputLimits:
         """The path constraints that limit the input."""
         rows = self.ocp.rows.path.of_kind("input")
         return rows if self.applied.what == "control" else rows.where(np.zeros(len(rows)))
+
+    @cached_property
+    def _steps(self) -> np.ndarray:
+        """Ways from a start to others, of the order of one, (6, m)."""
+        return np.random.default_rng(0).normal(size=(6, self.ocp.model.nu))
 
     @cached_property
     def _function(self) -> BufferedFunction:

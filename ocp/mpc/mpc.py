@@ -1,9 +1,11 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
 from math import inf
-from threading import Lock
+from threading import Lock, get_ident
+from time import perf_counter
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -19,6 +21,7 @@ from ocp.checks.arguments import (
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.closed_loop.decision import ControlRefused, Decision
 from ocp.closed_loop.delay import delay_steps
+from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import Observer, closed_loop
@@ -28,6 +31,7 @@ from ocp.mpc.fallback_ladder import FallbackLadder
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.step_inputs import Parameters
 from ocp.problem.ocp import OCP
+from ocp.problem.scaled import row_sizes
 from ocp.solution.solver import InitialGuess, Solver
 
 # What a run may take where a solver sets no limit [s]: far more than a control loop has.
@@ -89,7 +93,8 @@ class MPC:
             plan meets them. A step that needs it takes a second run of the solver.
         budget: time for a step [s]; None: unlimited.
         tolerance: by how much an input may leave its bounds, or a plan the constraints, before
-            that is a failure; an input that leaves them by less is clipped, and it is recorded.
+            that is a failure, in the sizes of the rows where the problem is scaled; an input that
+            leaves them by less is clipped, and it is recorded.
         compiled: whether the solver, where it has such an option, and the model run as machine
             code. The first build takes seconds; see ``compiled``.
 
@@ -123,6 +128,8 @@ class MPC:
     state: ControllerState = field(init=False, repr=False)
     # A step takes the state that the step before it has left.
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
+    # The thread that is inside a step.
+    _inside: int | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
@@ -130,6 +137,7 @@ class MPC:
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
         self.reset()
         self._ladder = self._built()
+        self._ladder.prepare()
 
     def __reduce__(self) -> tuple[Callable[..., "MPC"], tuple[type["MPC"], dict[str, Any], Any]]:
         """Copy and pickle options and ``state``; the copy builds its own solver."""
@@ -142,7 +150,7 @@ class MPC:
             ocp=self.ocp,
             program=solver.build(self.ocp),
             least=solver.least_violating(self.ocp) if self.least_violating else None,
-            imposed=solver.imposed(self.ocp),
+            imposed=replace(solver.imposed(self.ocp), sizes=row_sizes(self.ocp)),
             dt=self.dt,
             applied=self.applied,
             backup=self.backup_law,
@@ -193,7 +201,7 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        with self._lock:
+        with self._alone():
             raised = hasattr(self, "state") and self.state.solver_raised
             begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
             self.state = begun._replace(solver_raised=raised)
@@ -219,14 +227,39 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        with self._lock:
-            if self.state.solver_raised:
-                self._ladder = self._built()
-            ladder, state = self._ladder, self.state
-            report, self.state = ladder.step(state, x, t, late=late, parameters=parameters)
+        with self._alone():
+            started = perf_counter()
+            broken = self._rebuild() if self.state.solver_raised else ""
+            report, self.state = self._ladder.step(
+                self.state, x, t, late=late, parameters=parameters, started=started, broken=broken
+            )
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)
         return report
+
+    def _rebuild(self) -> str:
+        """Build the solver again; return why that fails, or nothing."""
+        try:
+            self._ladder = self._built()
+        except CALLBACK_ERRORS as error:
+            return f"the solver cannot be built again: {type(error).__name__}: {error}"
+        return ""
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Let one thread in at a time, and none twice.
+
+        Raises:
+            ProblemError: if a callback of a step calls the controller.
+        """
+        if self._inside == get_ident():
+            raise ProblemError(f"MPC of {self.ocp.name}: step or reset is called inside a step")
+        with self._lock:
+            self._inside = get_ident()
+            try:
+                yield
+            finally:
+                self._inside = None
 
     def run(
         self,

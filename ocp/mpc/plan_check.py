@@ -31,7 +31,7 @@ _USABLE = frozenset(
     }
 )
 # Of an instant, relative to the interval: later than the end by less is the end.
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 _NO_PARAMETERS = np.empty(0)
 
 
@@ -59,6 +59,20 @@ class HorizonParameters(NamedTuple):
     def between(self, times: np.ndarray) -> IntervalParameters:
         """Return those at both ends of the intervals between instants (N + 1,) [s]."""
         return self.values.on((times - self.start) / self.duration)
+
+
+class PlanViolation(NamedTuple):
+    """What a plan violates when the model runs under it.
+
+    Attributes:
+        of_inputs: the largest excess of a row that limits the input, at the solver's nodes.
+        largest: of any row, those of the end included.
+        worst: which, and when.
+    """
+
+    of_inputs: float
+    largest: float
+    worst: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,35 +114,35 @@ class PlanCheck:
             return np.inf, plan.status.value
         return self.remainder(plan, start, t, p)
 
-    def least_violating(
+    def violation(
         self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
-    ) -> tuple[float, str]:
-        """Return by how much a plan exceeds the limits of the input, and what it violates most.
+    ) -> PlanViolation:
+        """Run the model under a plan that need not meet the constraints on states.
 
         Infinite where there is no plan that is worth applying.
         """
         if foreign := self._foreign(plan, start, t):
-            return np.inf, foreign
+            return PlanViolation(np.inf, np.inf, foreign)
         if not plan.status.is_success and plan.status not in _USABLE:
-            return np.inf, plan.status.value
+            return PlanViolation(np.inf, np.inf, plan.status.value)
         u, between = plan_controls(plan, plan.t[:-1]), p.between(plan.t)
         model = self._rollout(len(u))
         result = model.of(start, u, plan.t, between)
         if not isfinite(result.excess):
-            return np.inf, result.worst
+            return PlanViolation(np.inf, np.inf, result.worst)
         inputs, _ = self._input_rollout(len(u)).excess(result.x, u, plan.t, between)
         end = model.end_excess(result.x[-1], plan.t[-1], p.at(plan.t[-1]))
-        return inputs, max((result.excess, result.worst), end)[1]
+        return PlanViolation(inputs, *max((result.excess, result.worst), end))
 
     def _foreign(self, plan: Solution, start: np.ndarray, t: float) -> str:
         """Return in what a solver's answer is not one to the question; empty where it is."""
         if plan.problem is not self.ocp and self._differs(plan.problem):
             return "the plan is one of another problem"
-        if abs(plan.t[0] - t) > _ROUNDING * self.dt:
+        if abs(plan.t[0] - t) > ROUNDING * self.dt:
             return f"the plan begins at {plan.t[0]:.6g} s, not at {t:.6g} s"
-        if abs(plan.duration - self.ocp.duration) > _ROUNDING * self.dt:
+        if abs(plan.duration - self.ocp.duration) > ROUNDING * self.dt:
             return f"the plan is {plan.duration:.6g} s long, not {self.ocp.duration:.6g} s"
-        if (np.abs(plan.x[0] - start) > _ROUNDING * (1.0 + np.abs(start))).any():
+        if (np.abs(plan.x[0] - start) > ROUNDING * (1.0 + np.abs(start))).any():
             return f"the plan begins at {plan.x[0]}, not at {start}"
         return ""
 
@@ -140,7 +154,7 @@ class PlanCheck:
         Those of the end are checked for a whole plan only: a remainder ends before its horizon.
         """
         times = t + plan.t - plan.t[0]
-        left = int((times[:-1] < plan.t[-1] - _ROUNDING * self.dt).sum())
+        left = int((times[:-1] < plan.t[-1] - ROUNDING * self.dt).sum())
         if not left:
             return np.inf, "nothing is left of it"
         times = times[: left + 1]
@@ -159,7 +173,7 @@ class PlanCheck:
     def _rollout(self, n: int) -> ModelRollout:
         """Return a roll-out that checks the rows at all nodes."""
         if n not in self._rollouts:
-            imposed = ImposedRows(self.imposed.rows)
+            imposed = ImposedRows(self.imposed.rows, sizes=self.imposed.sizes)
             self._rollouts[n] = ModelRollout(self.ocp, n, self.compiled, imposed=imposed)
         return self._rollouts[n]
 

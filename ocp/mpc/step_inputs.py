@@ -32,7 +32,7 @@ class StepInputs(NamedTuple):
         t: when the state was measured [s].
         applies_at: when the input acts [s].
         start: the state then (nx,), predicted where need be; of the last plan where nothing is
-            measured, NaN where there is no plan either.
+            measured, NaN for what is missing where there is no plan either.
         parameters: of the horizon from ``applies_at`` on.
         now: parameters when the input acts (n_p,).
         parameters_known: False where they are those of the last plan, as far as they reach.
@@ -77,7 +77,7 @@ class InputCollector:
         missing = missing_measurement(self.ocp, start)
         at_effect = p.at(applies_at)
         if missing:
-            start = np.full(nx, np.nan) if plan is None else plan.state(applies_at)
+            start = present(self.ocp, start) if plan is None else plan.state(applies_at)
         elif self.compensate and state.pending:
             for k, sent in enumerate(state.pending):
                 start = self._next_state(start, sent, t + k * self.dt, at_effect)
@@ -120,6 +120,11 @@ def missing_measurement(ocp: OCP, measured: np.ndarray) -> str:
         return "the measurement is not finite"
     worst = int((np.abs(measured) / plausible).argmax())
     return f"the measurement {ocp.model.x_names[worst]} = {values[worst]:.3g} cannot be meant"
+
+
+def present(ocp: OCP, measured: np.ndarray) -> np.ndarray:
+    """Return a measured state (nx,) with NaN for what is missing."""
+    return np.where(np.abs(measured) <= _plausible(ocp), measured, np.nan)
 
 
 @once_per_problem

@@ -138,3 +138,10 @@ class Constraint(Portable):
     def is_equation(self) -> bool:
         """Whether every row is an equation."""
         return bool(np.all(np.asarray(self.lower) == np.asarray(self.upper)))
+
+
+def unused(name: str, names: set[str]) -> str:
+    """Return a name that none of these is, as like the given one as can be."""
+    while name in names:
+        name += "'"
+    return name

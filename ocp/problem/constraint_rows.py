@@ -60,11 +60,18 @@ class Violation(NamedTuple):
         amount: distance from the bound, in the unit of the row; inf where it is no number.
         row: which.
         t: when [s].
+        size: what the row is measured in, where that was asked for.
     """
 
     amount: float = 0.0
     row: ConstraintRow | None = None
     t: float = 0.0
+    size: float = 1.0
+
+    @property
+    def relative(self) -> float:
+        """The amount in sizes of the row."""
+        return self.amount / self.size
 
     @property
     def where(self) -> str:
@@ -190,7 +197,12 @@ class ConstraintRows:
         return self.box.excess(values)
 
     def largest_violation(
-        self, values: np.ndarray, t: np.ndarray, *, exempt: np.ndarray | None = None
+        self,
+        values: np.ndarray,
+        t: np.ndarray,
+        *,
+        exempt: np.ndarray | None = None,
+        sizes: np.ndarray | None = None,
     ) -> Violation:
         """Return the largest violation along a trajectory, the earliest where several are equal.
 
@@ -198,15 +210,17 @@ class ConstraintRows:
             values: (K, m).
             t: instants [s], (K,).
             exempt: where a row does not hold, bool (K, m).
+            sizes: what each row is measured in, (m,); None: 1.
         """
         if not values.size:
             return Violation()
         excess = self.excess(values)
         if exempt is not None:
             excess[exempt] = 0.0
-        k, i = divmod(int(excess.argmax()), len(self.rows))
-        amount = float(excess[k, i])
-        return Violation(amount, self.rows[i], float(t[k])) if amount > 0.0 else Violation()
+        relative = excess if sizes is None else excess / sizes
+        k, i = divmod(int(relative.argmax()), len(self.rows))
+        amount, size = float(excess[k, i]), 1.0 if sizes is None else float(sizes[i])
+        return Violation(amount, self.rows[i], float(t[k]), size) if amount > 0.0 else Violation()
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +255,15 @@ class ProblemRows:
         )
 
 
+class RowSizes(NamedTuple):
+    """What the rows of a problem are measured in, one size a row."""
+
+    states: np.ndarray
+    controls: np.ndarray
+    path: np.ndarray
+    terminal: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class ImposedRows:
     """The rows that a solver imposes, and the nodes of its grid at which it does not.
@@ -251,11 +274,13 @@ class ImposedRows:
             no control is left, bool (N + 1,); None: at no other.
         no_state_rows: at which nodes rows of states alone do not hold, beside the first one, which
             is measured, bool (N + 1,); None: at no other.
+        sizes: what rows are measured in; None: 1.
     """
 
     rows: ProblemRows
     no_control_rows: np.ndarray | None = None
     no_state_rows: np.ndarray | None = None
+    sizes: RowSizes | None = None
 
 
 def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:

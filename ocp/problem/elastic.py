@@ -17,7 +17,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import Portable
@@ -56,13 +56,16 @@ class Elastic(Portable):
         below = np.flatnonzero(np.isfinite(lower)).tolist()
         scaled = rows.expression / ca.DM(unit)
         kept = [*ocp.at("initial")]
-        if inputs := ocp.rows.path.of_kind("input"):
-            limits = inputs.box.lower, inputs.box.upper
-            kept.append(Constraint("input", inputs.expression, *limits, limits_input=True))
-        if above:
-            kept.append(Constraint("upper", scaled[above] - s, upper=(upper / unit)[above]))
-        if below:
-            kept.append(Constraint("lower", scaled[below] + s, lower=(lower / unit)[below]))
+        names = {c.name for c in (*kept, *ocp.invariants)}
+        inputs = ocp.rows.path.of_kind("input")
+        for name, expression, low, high, limits_input in (
+            ("input", inputs.expression, inputs.box.lower, inputs.box.upper, True),
+            ("upper", scaled[above] - s, -np.inf, (upper / unit)[above], None),
+            ("lower", scaled[below] + s, (lower / unit)[below], np.inf, None),
+        ):
+            if expression.numel():
+                own = unused(name, names)
+                kept.append(Constraint(own, expression, low, high, limits_input=limits_input))
         box = ocp.control_bounds
         return replace(
             ocp,
@@ -74,7 +77,7 @@ class Elastic(Portable):
                 u_nominal=None if m.u_nominal is None else np.append(m.u_nominal, 1.0),
             ),
             running_cost=ca.SX(ocp.running_cost) + weight * (s + s**2 / 2),
-            terminal_cost=ca.SX(ocp.terminal_cost) + weight * ocp.duration * self._at_end,
+            terminal_cost=ca.SX(ocp.terminal_cost) + weight * self._horizon * self._at_end,
             control_bounds=Box(np.append(box.lower, 0.0), np.append(box.upper, np.inf)),
             state_bounds=Box(),
             constraints=tuple(kept),
@@ -85,8 +88,12 @@ class Elastic(Portable):
     @property
     def penalty(self) -> float:
         """The price w of a relative violation, per second or step."""
-        horizon = self.original.steps or self.original.duration
-        return _PRICE * sizes_of(self.original).cost / float(horizon)
+        return _PRICE * sizes_of(self.original).cost / self._horizon
+
+    @property
+    def _horizon(self) -> float:
+        """What the running cost is summed over: seconds, or steps."""
+        return float(self.original.steps or self.original.duration)
 
     def slacks(self, fractions: np.ndarray, x: np.ndarray | None, u: np.ndarray) -> np.ndarray:
         """Return the slack of a first guess: none, (len(fractions), 1)."""

@@ -14,14 +14,14 @@ import numpy as np
 
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.checks.expressions import readable
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues, Signal
 from ocp.problem.walk import applied, walk
 
 _MAXIMA = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
-# Instants at which the weight of a maximum is checked, and a guess is sampled.
+# Instants at which a guess is sampled.
 _INSTANTS = 21
 
 
@@ -35,8 +35,9 @@ def without_kinks(ocp: OCP) -> OCP:
 
     and abs(a) = max(a, -a), min(a, b) = -max(-a, -b). The optimum is the same, and smooth where
     a and b are: Newton's method converges on it. A maximum is replaced that enters the running
-    cost with a weight that is not negative (a minimum: not positive) and contains no state and no
-    control; others stay. The slack controls are appended to the controls of the model.
+    cost with a weight that is not negative (a minimum: not positive), contains no state, control
+    or time, and is affine in signals; others stay. The slack controls are appended to the controls
+    of the model.
 
     ``MultipleShooting``, ``BetweenNodes`` and ``Collocation`` do it by themselves where their grid
     treats the slack controls exactly.
@@ -95,14 +96,18 @@ class Epigraph:
         """The problem whose last controls are the slacks."""
         ocp, m, s = self.original, self.original.model, self.rewritten.s
         many, box = np.full(s.numel(), np.inf), ocp.control_bounds
+        names = {c.name for c in (*ocp.constraints, *ocp.invariants)}
         above = tuple(
-            Constraint(f"slack {i}", expression, 0.0)
+            Constraint(unused(f"slack {i}", names), expression, 0.0)
             for i, expression in enumerate(self.rewritten.constraints)
         )
         units = (*m.u_units, *[""] * s.numel()) if m.u_units else ()
+        nominal = m.u_nominal
+        if nominal is not None:
+            nominal = np.append(np.broadcast_to(nominal, m.nu), np.ones(s.numel()))
         return replace(
             ocp,
-            model=replace(m, u=ca.vertcat(m.u, s), u_units=units),
+            model=replace(m, u=ca.vertcat(m.u, s), u_units=units, u_nominal=nominal),
             running_cost=self.rewritten.cost,
             control_bounds=Box(np.append(box.lower, -many), np.append(box.upper, many)),
             constraints=(*ocp.constraints, *above),
@@ -142,21 +147,21 @@ class Epigraph:
 
     @property
     def depends_on_data(self) -> bool:
-        """Whether parameters or the time decide if it holds."""
-        return ca.depends_on(
-            self.rewritten.weights, ca.vertcat(self.original.model.t, self.original.p)
-        )
+        """Whether parameters decide if it holds."""
+        return ca.depends_on(self.rewritten.weights, self.original.p)
 
     def holds(self, values: ParameterValues) -> bool:
-        """Whether no weight is negative with these parameters, so that each slack sinks."""
-        fractions = np.linspace(0.0, 1.0, _INSTANTS)
-        t, p = fractions[None, :] * self.original.duration, values.at(fractions).T
-        return bool((np.array(self._weights.map(_INSTANTS)(t, p)) >= 0.0).all())
+        """Whether no weight is negative with these parameters, so that each slack sinks.
+
+        A weight is affine in signals, and these are extreme at their knots, on either side.
+        """
+        knots = values.knots
+        p = np.vstack([values.at(knots, 1), values.at(knots, -1)]).T
+        return bool((np.array(self._weights.map(p.shape[1])(p)) >= 0.0).all())
 
     @cached_property
     def _weights(self) -> ca.Function:
-        inputs = [self.original.model.t, self.original.p]
-        return ca.Function("weights", inputs, [self.rewritten.weights])
+        return ca.Function("weights", [self.original.p], [self.rewritten.weights])
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,8 +234,9 @@ class _Rewritten:
         unfit = set[int]()
         for j, node in enumerate(self.nodes):
             weight = weights[:, j]
-            varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, self.s))
-            if not varies and not ca.depends_on(weight, ca.vertcat(m.t, ocp.p)):
+            varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, m.t, self.s))
+            varies = varies or _bends(weight, ocp)
+            if not varies and not ca.depends_on(weight, ocp.p):
                 varies = not (np.array(ca.evalf(weight)) >= 0.0).all()
             if varies or (held and ca.depends_on(self.maxima[j], changing)):
                 unfit.add(node)
@@ -239,10 +245,10 @@ class _Rewritten:
     def refusal(self, ocp: OCP) -> str:
         """Return why no maximum can be replaced."""
         m, said = ocp.model, ", ".join(readable(each) for each in self.maxima)
-        if ca.depends_on(self.weights, ca.vertcat(m.x, m.u, self.s)):
+        if ca.depends_on(self.weights, ca.vertcat(m.x, m.u, m.t, self.s)):
             return (
-                f"{ocp.name}: the weight of {said} in the running cost contains a state or a "
-                "control, so slack controls do not replace it"
+                f"{ocp.name}: the weight of {said} in the running cost contains a state, a "
+                "control or the time, so slack controls do not replace it"
             )
         return (
             f"{ocp.name}: {said} enters the running cost with a negative weight, so its minimum is "
@@ -255,6 +261,14 @@ def _has_maximum(ocp: OCP) -> bool:
     cost = ca.SX(ocp.running_cost)
     function = ca.Function("cost", [ca.vertcat(*ca.symvar(cost))], [cost])
     return any(function.instruction_id(k) in _MAXIMA for k in range(function.n_instructions()))
+
+
+def _bends(weight: ca.SX, ocp: OCP) -> bool:
+    """Whether a weight is not affine in the signals: between knots it might be negative."""
+    signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
+    if not signals:
+        return False
+    return any(ca.which_depends(ca.vec(weight), ca.vertcat(*signals), 2, True))
 
 
 def _changing(ocp: OCP) -> ca.SX:

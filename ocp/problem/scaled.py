@@ -16,7 +16,7 @@ import numpy as np
 
 from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Box, Constraint
-from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows, RowSizes
 from ocp.problem.model import Model
 from ocp.problem.nominal_sizes import Sizes, nominal_sizes
 from ocp.problem.ocp import OCP
@@ -80,6 +80,21 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         original=ocp,
         sizes=rounded,
     )
+
+
+def row_sizes(ocp: OCP) -> RowSizes | None:
+    """Return what the rows of a problem are measured in where it is scaled; None: 1."""
+    in_sizes = scaled(ocp)
+    if in_sizes is None:
+        return None
+    sizes, rows = in_sizes.sizes, ocp.rows
+    path, terminal = (_of_rows(sizes, part) for part in (rows.path, rows.terminal))
+    return RowSizes(sizes.x, sizes.u, path, terminal)
+
+
+def _of_rows(sizes: Sizes, rows: ConstraintRows) -> np.ndarray:
+    names = dict.fromkeys(row.name for row in rows.rows)
+    return np.concatenate([[], *[sizes.rows[name] for name in names]])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

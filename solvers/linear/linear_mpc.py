@@ -19,6 +19,7 @@ from ocp.internal import (
     check_choice,
     check_positive,
     elastic,
+    scaled,
     start_violation,
 )
 from solvers.linear import regulator_gains as recursion
@@ -81,7 +82,7 @@ class LinearMPC(ScalingSolver):
 
     def least_violating(self, ocp: OCP) -> Program | None:
         """Build the program with soft rows; None where they are soft already, or there are none."""
-        relaxed = elastic(ocp)
+        relaxed = elastic(scaled(ocp) or ocp)  # it is solved in these sizes
         if relaxed is None or self.soft is not None:
             return None
         return replace(self.unjudged(), soft=relaxed.penalty).build(ocp)
@@ -92,8 +93,7 @@ class LinearMPC(ScalingSolver):
         form = _FORMS[self.form](lq)
         softening = None
         if self.soft is not None:
-            rows = [form.equations + i for i, p in enumerate(form.places) if not p.limits_input]
-            softening = Softening(np.array(rows, dtype=int), self.soft)
+            softening = Softening(elastic_rows(form), self.soft)
         program = LinearMPCProgram(
             self, ocp, lq, form, qp_backend(self.backend, self.tolerance), softening
         )
@@ -105,6 +105,12 @@ class LinearMPC(ScalingSolver):
                 "another backend"
             )
         return program
+
+
+def elastic_rows(form: MPCForm) -> np.ndarray:
+    """Return the rows that may be relaxed: all but dynamics and limits of the input."""
+    rows = [form.equations + i for i, place in enumerate(form.places) if not place.limits_input]
+    return np.array(rows, dtype=int)
 
 
 def _is_strictly_convex(h: sp.csc_matrix) -> bool:
@@ -243,7 +249,7 @@ class LinearMPCProgram(MethodProgram):
         if answer.z is not None and answer.y is not None and max(found) <= self.solver.tolerance:
             y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
             return _Verdict(answer.z[:size], y, Status.SOLVED, self._exceeded(answer.z[size:]))
-        elastic = self._elastic_rows()
+        elastic = elastic_rows(self.form)
         point, excess = least_violation(qp if self.softening else hard, elastic, rows)
         if excess.max(initial=0.0) > _UNAVOIDABLE:
             worst = int(excess.argmax())
@@ -257,12 +263,6 @@ class LinearMPCProgram(MethodProgram):
             return _Verdict(point[:size], np.zeros(rows), Status.FAILED, said)
         y = answer.y if self.softening is None else self.softening.multipliers(answer.y)
         return _Verdict(answer.z[:size], y, Status.ITERATION_LIMIT, said)
-
-    def _elastic_rows(self) -> np.ndarray:
-        """Rows that are relaxed to find the cause: all but dynamics and limits of the input."""
-        rows = [self.form.equations + i for i, p in enumerate(self.form.places)
-                if not p.limits_input]  # fmt: skip
-        return np.array(rows, dtype=int)
 
     def _where(self, row: int) -> str:
         place = self.form.places[row - self.form.equations]

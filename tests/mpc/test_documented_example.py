@@ -15,7 +15,7 @@ def test_the_example_runs(tmp_path, monkeypatch, capsys) -> None:
     said = capsys.readouterr().out
     assert "replayed to the last bit: True" in said
     assert "'speed' is violated" in said
-    assert said.splitlines()[0] == "OPTIMAL   39"
+    assert said.splitlines()[0] == "OPTIMAL         39"
 
 
 @pytest.mark.slow
@@ -24,7 +24,6 @@ def test_the_balloon_keeps_its_limit_by_a_cushion_only(capsys) -> None:
     code = section.split("```python\n")[1].split("```")[0]
     exec(compile(code, str(PAGE), "exec"), {"__name__": "example"})
     hard, soft = capsys.readouterr().out.splitlines()
-    assert "backup" in hard
-    assert float(hard.split("highest ")[1].split()[0]) > 12.0
+    assert "least_violating" in hard
     assert "violation 0, 150 optimal>" in soft
     assert float(soft.split("highest ")[1].split()[0]) < 10.5

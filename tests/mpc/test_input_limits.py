@@ -97,6 +97,42 @@ def test_a_bound_that_varies_with_time_holds_for_the_backup_too() -> None:
         assert decided.input[0] == pytest.approx(0.5 + 0.4 * np.cos(0.1 * k), abs=1e-9)
 
 
+def test_a_limit_of_the_input_stays_one_in_rate_form() -> None:
+    """After the substitution it contains a state; a mixed constraint is split."""
+    supply = Constraint("supply", ca.vertcat(U, X[1]), [-np.inf, -9.0], [0.5, 9.0])
+    in_rates = with_input_rate(cart(constraints=(supply,)), rate=Box(-0.3, 0.3))
+    kinds = {row.name: row.kind for row in in_rates.rows.path.rows}
+    assert kinds == {"supply": "hard", "supply, input": "input", "control_bounds": "input"}
+    for solver in (LinearMPC(soft=1.0), LinearMPC()):
+        mpc, z = MPC(ocp=in_rates, solver=solver, dt=0.1), np.array([-2.0, 0.0, 0.0])
+        for k in range(8):
+            decided = mpc.step(z, 0.1 * k)
+            z[2] += decided.input[0]
+            assert z[2] <= 0.5 + 1e-9
+            z = np.array([z[0] + 0.1 * z[1], z[1] + 0.1 * z[2], z[2]])
+
+
+def test_from_the_middle_of_a_ring_an_input_is_moved_onto_it() -> None:
+    """There the slope of the row vanishes."""
+    plain = disc()
+    limits = InputLimits(
+        replace(plain, constraints=(Constraint("ring", ca.sumsqr(plain.model.u), 0.5, 1.0),)),
+        PlantInput(),
+    )
+    at = Instant(np.zeros(2), 0.0, np.empty(0))
+    found = limits.nearest(np.zeros(2), at)
+    assert np.linalg.norm(found) == pytest.approx(np.sqrt(0.5), abs=1e-4)
+    assert limits.exceeded(found, at) == ""
+
+
+def test_limits_that_exclude_each_other_are_named() -> None:
+    beyond = cart(constraints=(Constraint("supply", U, lower=3.0),))
+    mpc = MPC(ocp=beyond, solver=LinearMPC(), dt=0.1, backup=lambda x, t: [0.0])
+    decided = mpc.step([1.0, 0.0], 0.0)
+    assert decided.input[0] == 2.0
+    assert "constraint 'supply' is violated by 1" in decided.message
+
+
 def disc() -> OCP:
     u = ca.SX.sym("u", 2)
     plane = Model(name="plane", x=X, u=u, f=u)
@@ -146,6 +182,28 @@ def test_only_a_path_constraint_limits_an_input() -> None:
         Constraint("end", X, 0.0, 0.0, at="terminal", limits_input=True)
     with pytest.raises(ProblemError, match="limits_input"):
         Constraint("end", X, limits_input="yes")  # pyright: ignore[reportArgumentType]
+
+
+# -- in the sizes of the rows ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", [1e-7, 1.0, 1e7])
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+def test_plans_are_judged_in_sizes_of_the_rows(unit: float, backend) -> None:
+    """A violation of 1e-5 Pa in a million made the loop throw solved plans away."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    asked = OCP(
+        name="axis",
+        model=Model(name="axis", x=x, u=u, f=unit * u - x),
+        x0=[0.9 * unit],
+        horizon=1.0,
+        running_cost=(x / unit - 2) ** 2 + 0.01 * u**2,
+        control_bounds=Box(-5.0, 5.0),
+        state_bounds=Box(-unit, unit),
+    )
+    mpc = MPC(ocp=asked, solver=MultipleShooting(10, backend=backend), dt=0.1)
+    rollout = mpc.run(Plant(ocp=asked), [0.9 * unit], 2.0)
+    assert set(rollout.sources) == {InputSource.OPTIMAL}, rollout.messages
 
 
 # -- suggested laws that see nothing --------------------------------------------------------------

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.mpc.altered import Altered
 from ocp import (
     MPC,
     OCP,
@@ -23,6 +24,7 @@ from ocp import (
     Rollout,
     Solution,
     Solver,
+    Status,
     closed_loop,
     replay_all,
 )
@@ -166,6 +168,46 @@ def test_a_solver_that_raised_is_built_again(error: Exception) -> None:
     assert mpc.step([1.0, 0.0], 0.0).source is InputSource.OPTIMAL
 
 
+def test_a_solver_that_cannot_be_built_again_costs_steps_only(monkeypatch) -> None:
+    mpc, builds = controller(Strange({0.1: RuntimeError("gone")})), []
+    mpc.step([1.0, 0.0], 0.0)
+    mpc.step([1.0, 0.0], 0.1)
+    build = Strange.build
+
+    def full(solver: Strange, ocp: OCP) -> Program:
+        builds.append(1)
+        if len(builds) < 3:
+            raise OSError(28, "No space left on device")
+        return build(solver, ocp)
+
+    monkeypatch.setattr(Strange, "build", full)
+    for k in (2, 3):
+        lost = mpc.step([1.0, 0.0], k * DT)
+        assert lost.source is InputSource.SHIFTED
+        assert "cannot be built again: OSError" in lost.message
+    assert mpc.step([1.0, 0.0], 0.4).source is InputSource.OPTIMAL
+
+
+def test_a_callback_that_calls_the_controller_is_refused_by_name() -> None:
+    def parameters(t: float) -> Any:
+        if t > 0.05:
+            mpc.reset()
+        return {"price": [0.2]}
+
+    mpc = controller(ocp=priced(), parameters=parameters)
+    mpc.step([1.0, 0.0], 0.0)
+    assert "called inside a step" in mpc.step([1.0, 0.0], 0.1).message
+
+
+def test_without_a_control_there_is_nothing_to_decide() -> None:
+    x = ca.SX.sym("x")
+    falling = Model(name="falling", x=x, u=ca.SX(0, 1), f=-x)
+    alone = OCP(name="falling", model=falling, x0=[1.0], horizon=1.0, running_cost=x**2)
+    decided = controller(ocp=alone).step([1.0], 0.0)
+    assert decided.source is InputSource.OPTIMAL
+    assert decided.input.shape == (0,)
+
+
 def test_time_that_runs_backwards_leaves_no_earlier_plan() -> None:
     mpc = controller(Strange({0.0: ValueError("none today")}))
     mpc.step([1.0, 0.0], 5.0)
@@ -294,6 +336,32 @@ def test_a_limit_of_the_input_that_moves_is_kept_by_what_acts_at_an_edge() -> No
     for k, u in enumerate(rollout.inputs.ravel()):
         assert u <= 0.5 + np.sin(9 * DT * k) + 1e-9
     assert InputSource.BACKUP not in rollout.sources
+
+
+def test_the_rung_has_the_time_of_its_step_only() -> None:
+    """With no time left it is not tried, and with the budget used up by it, it does not act."""
+    mpc = controller(ocp=fast(), backup=lambda x, t: [0.0])
+    told = mpc.step([0.0, 1.0], 0.0, late=True)
+    assert told.source is InputSource.BACKUP
+    hasty = controller(ocp=fast(), backup=lambda x, t: [0.0], budget=1e-9)
+    decided = hasty.step([0.0, 1.0], 0.0)
+    assert decided.source is InputSource.BACKUP
+    assert decided.late
+
+
+def test_where_the_second_program_meets_the_constraints_it_says_so() -> None:
+    """Only the solver itself fails: the plan at a price needs none."""
+    calls: list[float] = []
+
+    def once(solution: Solution, t0: float) -> Solution:
+        calls.append(t0)
+        failed = {"status": Status.DIVERGED, "message": "on purpose"}
+        return solution.with_(**failed) if len(calls) == 1 else solution
+
+    decided = controller(Altered(MultipleShooting(10), once)).step([0.5, 0.0], 0.0)
+    assert decided.source is InputSource.FEASIBLE
+    assert "on purpose" in decided.message
+    assert "another plan meets the constraints" in decided.message
 
 
 def test_linear_mpc_has_the_rung_as_well() -> None:
