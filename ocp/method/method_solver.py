@@ -4,7 +4,10 @@ from abc import abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Self
 
+import numpy as np
+
 from ocp.checks.arguments import check_flag
+from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import Program, Solver
 
@@ -19,13 +22,17 @@ class MethodSolver(Solver):
     Attributes:
         judged: whether a success is compared with the referee, see ``judged``. A control loop
             and methods that do it by themselves switch it off.
+        takes_knots: whether knots of signals are nodes of the grid, see ``node_fractions``. A
+            control loop, which reads held controls at its own instants, switches it off.
     """
 
     judged: bool = field(default=True, kw_only=True, repr=False, compare=False)
+    takes_knots: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the option."""
         check_flag(self.judged, f"{type(self).__name__}: judged")
+        check_flag(self.takes_knots, f"{type(self).__name__}: takes_knots")
 
     @abstractmethod
     def build(self, ocp: OCP) -> Program:
@@ -41,10 +48,16 @@ class MethodSolver(Solver):
         """By how much a terminal constraint may be missed in any case, in its own unit."""
         return 0.0
 
+    def nodes(self, ocp: OCP, intervals: int) -> np.ndarray:
+        """Return the nodes of a grid as fractions of the horizon, (N + 1,)."""
+        if not self.takes_knots:
+            return np.linspace(0.0, 1.0, intervals + 1)
+        return node_fractions(ocp, intervals)
+
     def unjudged(self) -> Self:
         """Return the solver without the comparison."""
         return replace(self, judged=False)
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> Solver:
         """Compare nothing: a step has no time for it; see ``Solver``."""
-        return self.unjudged()
+        return replace(self, judged=False, takes_knots=False)

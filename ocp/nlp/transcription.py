@@ -38,6 +38,7 @@ class Transcription:
         start_as_data: whether a fixed start enters the first stage as a number along which nothing
             is differentiated, for starts where a slope is not finite. z_0 stays an unknown
             with equal bounds, so that the stages keep their structure.
+        nodes: as fractions of the horizon, (N + 1,); None: see ``node_fractions``.
     """
 
     ocp: OCP
@@ -45,6 +46,7 @@ class Transcription:
     integrator: Integrator
     compiled: bool = False
     start_as_data: bool = False
+    nodes: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no problem; the numbers are checked by the solvers."""
@@ -74,7 +76,7 @@ class Transcription:
 
     @cached_property
     def _fractions(self) -> np.ndarray:
-        return node_fractions(self.ocp, self.n)
+        return node_fractions(self.ocp, self.n) if self.nodes is None else self.nodes
 
     def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""

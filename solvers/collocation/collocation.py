@@ -99,7 +99,9 @@ class Collocation(ScalingSolver):
 
     def mesh_of(self, ocp: OCP) -> Mesh:
         """Return the mesh for a problem, given or as equal as the knots of its signals allow."""
-        return self.mesh or Mesh.of(ocp, self.intervals, self.degree)
+        if self.mesh:
+            return self.mesh
+        return Mesh(tuple(self.nodes(ocp, self.intervals)), (self.degree,) * self.intervals)
 
     @property
     def nlp_backend(self) -> NlpBackend:

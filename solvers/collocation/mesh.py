@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import OCP, ProblemError
-from ocp.internal import check_instance, check_real, check_whole, node_fractions
+from ocp import ProblemError
+from ocp.internal import check_instance, check_real, check_whole
 from solvers.collocation.collocation_points import CollocationPoints, Family
 
 
@@ -45,12 +45,6 @@ class Mesh:
         """Return equal intervals of one degree."""
         check_whole(intervals, "mesh: intervals")
         return cls(tuple(np.linspace(0.0, 1.0, intervals + 1)), (degree,) * intervals)
-
-    @classmethod
-    def of(cls, ocp: OCP, intervals: int, degree: int) -> "Mesh":
-        """Return intervals of one degree, equal but for the knots of signals among the edges."""
-        check_whole(intervals, "mesh: intervals")
-        return cls(tuple(node_fractions(ocp, intervals)), (degree,) * intervals)
 
     @property
     def intervals(self) -> int:

@@ -108,6 +108,7 @@ class MultipleShooting(ScalingSolver):
             compiled=compiled or self.compiled,
             time_limit=limit,
             judged=False,
+            takes_knots=False,
             feasibility_restoration=False,
         )
 
@@ -121,8 +122,11 @@ class MultipleShooting(ScalingSolver):
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
-        transcription = Transcription(ocp, self.intervals, self.integrator, self.compiled)
-        grid = ShootingGrid.of(ocp, transcription.n, self.integrator, fast=self.compiled)
+        nodes = self.nodes(ocp, ocp.steps or self.intervals)
+        transcription = Transcription(
+            ocp, self.intervals, self.integrator, self.compiled, nodes=nodes
+        )
+        grid = ShootingGrid.of(ocp, nodes, self.integrator, fast=self.compiled)
         nlp = self.nlp_backend.build(transcription)
         return MultipleShootingProgram(self, ocp, transcription, grid, nlp)
 

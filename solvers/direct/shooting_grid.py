@@ -11,7 +11,6 @@ from ocp.internal import (
     RunData,
     Stage,
     compiled,
-    node_fractions,
     node_widths,
     sizes_of,
 )
@@ -24,28 +23,32 @@ class ShootingGrid:
 
     Attributes:
         ocp: the problem.
-        n: number of intervals N.
+        fractions: nodes as fractions of the horizon, (N + 1,).
         rollout: all intervals in a row.
         half_step: every interval on its own, with half the integration step.
     """
 
     ocp: OCP
-    n: int
+    fractions: np.ndarray
     rollout: BufferedFunction
     half_step: BufferedFunction
 
     @classmethod
-    def of(cls, ocp: OCP, n: int, integrator: Integrator, *, fast: bool) -> "ShootingGrid":
+    def of(
+        cls, ocp: OCP, fractions: np.ndarray, integrator: Integrator, *, fast: bool
+    ) -> "ShootingGrid":
         """Build them; ``fast``: as machine code."""
         finer = replace(integrator, steps=2 * integrator.steps)
         steps = [Stage.of(ocp, each, held=True).step for each in (integrator, finer)]
         step, half_step = map(compiled, steps) if fast else steps
-        return cls(ocp, n, BufferedFunction(step.mapaccum(n)), BufferedFunction(half_step.map(n)))
+        n = len(fractions) - 1
+        rollouts = map(BufferedFunction, (step.mapaccum(n), half_step.map(n)))
+        return cls(ocp, fractions, *rollouts)
 
-    @cached_property
-    def fractions(self) -> np.ndarray:
-        """Nodes as fractions of the horizon, (N + 1,)."""
-        return node_fractions(self.ocp, self.n)
+    @property
+    def n(self) -> int:
+        """Number of intervals N."""
+        return len(self.fractions) - 1
 
     @cached_property
     def _sizes(self) -> np.ndarray:

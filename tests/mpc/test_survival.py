@@ -372,6 +372,47 @@ def test_linear_mpc_has_the_rung_as_well() -> None:
     assert decided.input[0] == pytest.approx(-LIMIT, abs=1e-6)
 
 
+@pytest.mark.parametrize(("cost", "unit"), [(1.0, 1.0), (1e-5, 1e-3), (1e5, 1e3)])
+@pytest.mark.parametrize("backend", ["osqp", "daqp"])
+def test_the_price_of_linear_mpc_follows_the_units(cost: float, unit: float, backend) -> None:
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    f = ca.vertcat(x[0] + DT * x[1], x[1] + DT * unit * u)
+    asked = OCP(
+        name="edge",
+        model=Model(name="cart", x=x, u=u, f=f, dt=DT),
+        x0=[0.0, 0.0],
+        horizon=15,
+        running_cost=cost * ((10 * x[0] ** 2 + x[1] ** 2) / unit**2 + 0.1 * u**2),
+        control_bounds=Box(-2.0, 2.0),
+        state_bounds=Box([-9 * unit, -9 * unit], [0.1 * unit, 9 * unit]),
+    )
+    decided = controller(LinearMPC(backend), ocp=asked).step([0.0, unit], 0.0)
+    assert decided.source is InputSource.LEAST_VIOLATING, decided.message
+    assert decided.input[0] == pytest.approx(-LIMIT, abs=1e-5)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1.0])
+def test_an_end_is_missed_least_whatever_a_step_lasts(dt: float) -> None:
+    """A limit that cannot be met leaves the end, which can, to be met."""
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    asked = OCP(
+        name="steps",
+        model=Model(name="steps", x=x, u=u, f=x + u, dt=dt),
+        x0=[0.0],
+        horizon=10,
+        running_cost=u**2,
+        control_bounds=Box(-2.0, 2.0),
+        constraints=(
+            Constraint("away", x, lower=1.0),
+            Constraint("end", x, 5.0, 5.0, at="terminal"),
+        ),
+    )
+    decided = MPC(ocp=asked, solver=MultipleShooting(), dt=dt).step([-5.0], 0.0)
+    assert decided.source is InputSource.LEAST_VIOLATING
+    assert decided.plan is not None
+    assert decided.plan.x[-1, 0] == pytest.approx(5.0, abs=1e-3)
+
+
 def test_the_rung_can_be_left_out() -> None:
     mpc = controller(ocp=fast(), least_violating=False, backup=lambda x, t: [0.0])
     assert mpc.step([0.0, 1.0], 0.0).source is InputSource.BACKUP

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ocp import OCP, Box, Model, Signal, evaluate, solve
+from ocp import MPC, OCP, Box, Model, Signal, evaluate, solve
 from ocp.internal import node_fractions
 from solvers import Collocation, IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
@@ -100,3 +100,13 @@ def test_a_long_table_gives_up_its_straight_parts():
     for bend in (1 / 3, 2 / 3):
         assert np.abs(nodes - bend).min() < 1e-12
     assert len(nodes) == 21
+
+
+@pytest.mark.parametrize("solver", [MultipleShooting(10), StagewiseNewton(10)], ids=repr)
+def test_a_loop_reads_its_plans_at_its_own_instants(solver) -> None:
+    """Nodes between them would move the limits that a plan keeps away from where it is read."""
+    asked = tracking(signal([0.0, 5.0, -3.0, 7.0]))
+    plan = MPC(ocp=asked, solver=solver, dt=0.1).step([0.0], 0.0).plan
+    assert plan is not None
+    instants = np.linspace(0.0, 1.0, 11)
+    assert np.abs(instants[:, None] - plan.fractions).min(axis=1).max() < 1e-12

@@ -12,6 +12,7 @@ from ocp import (
     Model,
     Parameter,
     ProblemError,
+    Signal,
     UnsupportedProblem,
     evaluate,
     solve,
@@ -191,6 +192,53 @@ def test_a_price_may_change_its_sign_from_run_to_run():
     assert dear.cost == pytest.approx(evaluate(dear).cost)
     assert paid.cost == pytest.approx(evaluate(paid).cost)
     assert paid.cost < program.run(parameters={"price": 0.0}).cost < dear.cost
+
+
+def test_a_weight_that_time_turns_around_keeps_its_kink() -> None:
+    """At t0 = 3.3 s the sine is negative: a slack would sink for ever."""
+    t = ca.SX.sym("t")
+    body = Model(name="body", x=X, u=U, f=U, t=t)
+    asked = OCP(
+        name="timely",
+        model=body,
+        x0=[0.0],
+        horizon=1.0,
+        running_cost=ca.sin(t) * ca.fabs(U - 0.3) + U**2,
+        control_bounds=Box(-1.0, 1.0),
+        smoothness=0,
+    )
+    found = MultipleShooting(20).build(asked).run(t0=3.3)
+    assert found.cost == pytest.approx(evaluate(found).cost)
+    with pytest.raises(UnsupportedProblem, match="the time"):
+        without_kinks(asked)
+
+
+@pytest.mark.parametrize("hold", ["held", "linear"])
+def test_a_price_that_is_negative_for_a_sample_keeps_its_kink(hold) -> None:
+    price, samples = ca.SX.sym("price"), np.ones((42, 1))
+    asked = fuel(
+        price * ca.fabs(U) + U**2,
+        parameters=(Signal("price", price, samples, hold=hold),),
+        smoothness=0,
+    )
+    program = MultipleShooting(82).build(asked)
+    samples = samples.copy()
+    samples[17] = -0.5
+    for given in (np.ones((42, 1)), samples):
+        found = program.run(parameters={"price": given})
+        assert np.isfinite(found.cost)
+        assert found.cost == pytest.approx(evaluate(found).cost, rel=1e-3)
+
+
+def test_names_and_sizes_of_the_user_are_no_obstacle() -> None:
+    named = Constraint("slack 0", X, -9.0, 9.0)
+    plain = fuel(ca.fabs(U))
+    sized = fuel(
+        ca.fabs(U),
+        model=Model(name="body", x=plain.model.x, u=U, f=plain.model.f, u_nominal=2.0),
+        constraints=(*plain.constraints, named),
+    )
+    assert solve(sized, MultipleShooting(50)).cost == pytest.approx(FUEL, rel=1e-2)
 
 
 def test_what_a_held_slack_cannot_follow_stays_as_it_is():

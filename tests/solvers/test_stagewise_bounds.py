@@ -191,7 +191,8 @@ def test_the_step_is_the_minimum_of_the_quadratic_model(limit: float) -> None:
     H, q, A, gap = (np.array(value) for value in known)
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
-    schedule = ShootingGrid.of(ocp, n, RK4(), fast=False).schedule(data, ocp.duration)
+    grid = ShootingGrid.of(ocp, np.linspace(0.0, 1.0, n + 1), RK4(), fast=False)
+    schedule = grid.schedule(data, ocp.duration)
     here = newton.linearise(at, [*schedule, data.values.at(1.0)[0]])
     step = newton.direction(here)
     assert step.is_settled

@@ -82,7 +82,7 @@ class StagewiseNewton(ScalingSolver):
 
     def for_control_loop(self, *, compiled: bool, time_limit: float) -> "StagewiseNewton":
         """Set what is left open; see ``Solver``."""
-        return replace(self, compiled=compiled or self.compiled, judged=False)
+        return replace(self, compiled=compiled or self.compiled, judged=False, takes_knots=False)
 
     def prepare(self, ocp: OCP) -> "StagewiseNewtonProgram":
         """Build stages and recursion."""
@@ -90,7 +90,7 @@ class StagewiseNewton(ScalingSolver):
         _refuse(ocp)
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
-        grid = ShootingGrid.of(ocp, n, self.integrator, fast=fast)
+        grid = ShootingGrid.of(ocp, self.nodes(ocp, n), self.integrator, fast=fast)
         return StagewiseNewtonProgram(self, ocp, step, grid)
 
 
