@@ -13,6 +13,7 @@ from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
+from ocp.solution.status import Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +54,12 @@ class EpigraphProgram(Program):
         original = self.epigraph.original
         original.first_guess(guess)
         values = RunData.of(original, x0, t0, parameters).values
-        if self.written and not self.epigraph.holds(values):
+        if self.written and not self.epigraph.holds(values, t0):
             return self.written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
         answer = self.smooth.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        # A weight that is negative where nobody looked leaves no lower bound of the cost.
+        if self.written and answer.status is Status.DIVERGED:
+            return self.written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
         if not self.solver.judged:
             return answer
         return judged(answer, self.solver.success_accuracy, slack=self.solver.end_slack)

@@ -168,6 +168,8 @@ class FallbackLadder:
             if clock.is_over():
                 selected, reason = None, f"the least violating plan: {clock.said}"
             why = joined(why, reason)
+        if selected is None and state.plan is not None:  # without a better one, past its end
+            selected, _ = self._follow_shifted(state.plan, now, inputs.parameters, to_its_end=False)
         if selected is None:
             selected, reason = self._back_up(state.last_input, now)
             why = joined(why, reason)
@@ -175,13 +177,20 @@ class FallbackLadder:
 
     # -- the rungs ---------------------------------------------------------------------------
 
-    def _follow_shifted(self, plan: Solution | None, now: Instant, p: HorizonParameters) -> Rung:
+    def _follow_shifted(
+        self,
+        plan: Solution | None,
+        now: Instant,
+        p: HorizonParameters,
+        *,
+        to_its_end: bool = True,
+    ) -> Rung:
         """Follow the last good plan, if its remainder meets the constraints."""
         if plan is None:
             return None, "there is no earlier plan"
         if now.t < plan.t[0] - ROUNDING * self.dt:
             return None, f"time went back to {now.t:.6g} s, the plan begins at {plan.t[0]:.6g} s"
-        excess, worst = self._check.remainder(plan, now.x, now.t, p)
+        excess, worst = self._check.remainder(plan, now.x, now.t, p, to_its_end=to_its_end)
         if excess > self.tolerance:
             return None, f"the earlier plan: {worst}"
         return self._follow(plan, now, InputSource.SHIFTED)

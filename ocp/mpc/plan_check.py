@@ -147,11 +147,24 @@ class PlanCheck:
         return ""
 
     def remainder(
-        self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
+        self,
+        plan: Solution,
+        start: np.ndarray,
+        t: float,
+        p: HorizonParameters,
+        *,
+        to_its_end: bool = True,
     ) -> tuple[float, str]:
         """Run the model from t [s] under what is left of a plan, and check the constraints.
 
-        Those of the end are checked for a whole plan only: a remainder ends before its horizon.
+        Those of the end hold at the plan's own end, which a push of the state may have moved away.
+
+        Args:
+            plan: made at t or before.
+            start: state then (nx,).
+            t: [s].
+            p: of the horizon.
+            to_its_end: whether those of the end are checked.
         """
         times = t + plan.t - plan.t[0]
         left = int((times[:-1] < plan.t[-1] - ROUNDING * self.dt).sum())
@@ -161,7 +174,7 @@ class PlanCheck:
         u, model = plan_controls(plan, times[:-1]), self._rollout(left)
         result = model.of(start, u, times, p.between(times))
         found = result.excess, result.worst
-        if left < len(plan.t) - 1 or not isfinite(result.excess):
+        if not isfinite(result.excess) or not to_its_end:
             return found
         return max(found, model.end_excess(result.x[-1], times[-1], p.at(times[-1])))
 

@@ -23,6 +23,8 @@ from ocp.problem.walk import applied, walk
 _MAXIMA = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
 # Instants at which a guess is sampled.
 _INSTANTS = 21
+# Instants at which the weight of a maximum is looked at.
+_LOOKS = 201
 
 
 def without_kinks(ocp: OCP) -> OCP:
@@ -35,8 +37,8 @@ def without_kinks(ocp: OCP) -> OCP:
 
     and abs(a) = max(a, -a), min(a, b) = -max(-a, -b). The optimum is the same, and smooth where
     a and b are: Newton's method converges on it. A maximum is replaced that enters the running
-    cost with a weight that is not negative (a minimum: not positive), contains no state, control
-    or time, and is affine in signals; others stay. The slack controls are appended to the controls
+    cost with a weight that is not negative (a minimum: not positive), contains no state and no
+    control, and is affine in signals; others stay. The slack controls are appended to the controls
     of the model.
 
     ``MultipleShooting``, ``BetweenNodes`` and ``Collocation`` do it by themselves where their grid
@@ -147,21 +149,25 @@ class Epigraph:
 
     @property
     def depends_on_data(self) -> bool:
-        """Whether parameters decide if it holds."""
-        return ca.depends_on(self.rewritten.weights, self.original.p)
+        """Whether parameters or the time decide if it holds."""
+        unknown = ca.vertcat(self.original.model.t, self.original.p)
+        return ca.depends_on(self.rewritten.weights, unknown)
 
-    def holds(self, values: ParameterValues) -> bool:
+    def holds(self, values: ParameterValues, t0: float = 0.0) -> bool:
         """Whether no weight is negative with these parameters, so that each slack sinks.
 
-        A weight is affine in signals, and these are extreme at their knots, on either side.
+        A weight is affine in signals, and these are extreme at their knots, on either side. In
+        time it is looked at often; what is missed shows as a cost without a lower bound.
         """
-        knots = values.knots
-        p = np.vstack([values.at(knots, 1), values.at(knots, -1)]).T
-        return bool((np.array(self._weights.map(p.shape[1])(p)) >= 0.0).all())
+        at = np.union1d(values.knots, np.linspace(0.0, 1.0, _LOOKS))
+        t = np.tile(t0 + at * self.original.duration, 2)[None, :]
+        p = np.vstack([values.at(at, 1), values.at(at, -1)]).T
+        return bool((np.array(self._weights.map(t.size)(t, p)) >= 0.0).all())
 
     @cached_property
     def _weights(self) -> ca.Function:
-        return ca.Function("weights", [self.original.p], [self.rewritten.weights])
+        inputs = [self.original.model.t, self.original.p]
+        return ca.Function("weights", inputs, [self.rewritten.weights])
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,9 +240,9 @@ class _Rewritten:
         unfit = set[int]()
         for j, node in enumerate(self.nodes):
             weight = weights[:, j]
-            varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, m.t, self.s))
+            varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, self.s))
             varies = varies or _bends(weight, ocp)
-            if not varies and not ca.depends_on(weight, ocp.p):
+            if not varies and not ca.depends_on(weight, ca.vertcat(m.t, ocp.p)):
                 varies = not (np.array(ca.evalf(weight)) >= 0.0).all()
             if varies or (held and ca.depends_on(self.maxima[j], changing)):
                 unfit.add(node)
@@ -245,10 +251,10 @@ class _Rewritten:
     def refusal(self, ocp: OCP) -> str:
         """Return why no maximum can be replaced."""
         m, said = ocp.model, ", ".join(readable(each) for each in self.maxima)
-        if ca.depends_on(self.weights, ca.vertcat(m.x, m.u, m.t, self.s)):
+        if ca.depends_on(self.weights, ca.vertcat(m.x, m.u, self.s)):
             return (
-                f"{ocp.name}: the weight of {said} in the running cost contains a state, a "
-                "control or the time, so slack controls do not replace it"
+                f"{ocp.name}: the weight of {said} in the running cost contains a state or a "
+                "control, so slack controls do not replace it"
             )
         return (
             f"{ocp.name}: {said} enters the running cost with a negative weight, so its minimum is "

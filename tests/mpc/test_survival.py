@@ -413,6 +413,29 @@ def test_an_end_is_missed_least_whatever_a_step_lasts(dt: float) -> None:
     assert decided.plan.x[-1, 0] == pytest.approx(5.0, abs=1e-3)
 
 
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+def test_after_a_push_no_plan_is_followed_past_its_end(backend) -> None:
+    """The end cannot be reached in time: what was planned before the push led 5.7 m away."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    asked = OCP(
+        name="dock",
+        model=Model(name="ship", x=x, u=u, f=ca.vertcat(x[1], u)),
+        x0=[0.8, 0.0],
+        horizon=1.5,
+        running_cost=u**2,
+        control_bounds=Box(-3.0, 3.0),
+        constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    )
+    mpc, z, furthest = controller(MultipleShooting(15, backend=backend), ocp=asked), [0.8, 0.0], 0.0
+    for k in range(40):
+        z[1] += 3.0 * (k == 8)
+        a = mpc.step(z, k * DT).input[0]
+        z = [z[0] + DT * z[1] + DT**2 / 2 * a, z[1] + DT * a]
+        furthest = max(furthest, z[0])
+    assert furthest < 2.5
+    assert abs(z[0]) < 0.1
+
+
 def test_the_rung_can_be_left_out() -> None:
     mpc = controller(ocp=fast(), least_violating=False, backup=lambda x, t: [0.0])
     assert mpc.step([0.0, 1.0], 0.0).source is InputSource.BACKUP

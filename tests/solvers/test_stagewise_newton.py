@@ -145,7 +145,7 @@ def test_the_step_solves_the_newton_equations(make, sigma: float) -> None:
     start = slope[:nx, 0] + (hessian @ dw)[:nx] - jacobian[:, :nx].T @ dense[moves.sum() :]
 
     newton = NewtonStep.of(ocp, n, RK4(), fast=False)
-    grid = ShootingGrid.of(ocp, np.linspace(0, 1, n + 1), RK4(), fast=False)
+    grid = ShootingGrid.of(ocp, transcription.fractions, RK4(), fast=False)
     schedule = [*grid.schedule(data, ocp.duration), data.values.at(1.0)[0]]
     here = newton.linearise(at, schedule)
     step = newton.direction(here, sigma)
