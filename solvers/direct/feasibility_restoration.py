@@ -12,6 +12,8 @@ from solvers.direct.transcribed_problem import TranscribedProblem
 
 # Weight of the cost, which only selects one among the least violating trajectories.
 _TIE_BREAK = 1e-4
+# A violation up to this is none.
+_NONE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,9 @@ class FeasibilityRestoration:
         )
         hard = [int(i) for i in np.flatnonzero(~self._soft)]
         relaxed = ca.vertcat(g[hard], g[soft] + s, g[soft] - s, w[states] + s, w[states] - s)
-        nlp = {"x": ca.vertcat(w, s), "f": s + _TIE_BREAK * program["f"], "g": relaxed}
+        tie_break = ca.MX.sym("tie break")
+        nlp = {"x": ca.vertcat(w, s), "f": s + tie_break * program["f"], "g": relaxed}
+        nlp["p"] = ca.vertcat(program["p"], tie_break)
         options = QUIET | {
             "ipopt.print_level": 0,
             "ipopt.sb": "yes",
@@ -76,13 +80,16 @@ class FeasibilityRestoration:
         }
         if self.time_limit < np.inf:
             options["ipopt.max_wall_time"] = self.time_limit
-        function = ca.nlpsol("elastic", "ipopt", {**nlp, "p": program["p"]}, options)
+        function = ca.nlpsol("elastic", "ipopt", nlp, options)
         return BufferedNlp(function)
 
     def least_violating(
         self, w0: np.ndarray, bounds: dict[str, np.ndarray], p: np.ndarray
     ) -> LeastViolation | None:
         """Solve the elastic problem; None if that fails.
+
+        Where a violation is left, or nothing is found, once more without the cost: it may be so
+        large where the constraints hold that no weight makes it a mere tie break.
 
         Args:
             w0: first iterate.
@@ -96,14 +103,30 @@ class FeasibilityRestoration:
         lbg += [bounds["lbx"][states], -inf_states]
         ubg += [inf_states, bounds["ubx"][states]]
         inputs = {
-            "x0": np.append(w0, 1.0),
-            "p": p,
             "lbx": np.append(np.where(states, -np.inf, bounds["lbx"]), 0.0),
             "ubx": np.append(np.where(states, np.inf, bounds["ubx"]), np.inf),
             "lbg": np.concatenate(lbg),
             "ubg": np.concatenate(ubg),
         }
-        solution, stats = self._nlp(inputs)
+        found = None
+        for weight in (_TIE_BREAK, 0.0):
+            again = self._solved(w0 if found is None else found.result.w, p, weight, inputs, bounds)
+            if again and (found is None or again.violation < found.violation):
+                found = again
+            if found and found.violation <= _NONE:
+                break
+        return found
+
+    def _solved(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        weight: float,
+        inputs: dict[str, np.ndarray],
+        bounds: dict[str, np.ndarray],
+    ) -> LeastViolation | None:
+        given = {"x0": np.append(w0, 1.0), "p": np.append(p, weight)}
+        solution, stats = self._nlp(inputs | given)
         w = solution["x"][:-1]
         if not stats["success"] or not np.isfinite(w).all():
             return None
