@@ -7,6 +7,20 @@ import numpy as np
 from ocp.solution.solution import Solution
 
 
+class Seen(NamedTuple):
+    """The last measurement that was whole, and what has acted since.
+
+    Attributes:
+        t: when it was made [s].
+        x: the state (nx,).
+        acting: the inputs from then on, one a sampling interval, oldest first.
+    """
+
+    t: float
+    x: np.ndarray
+    acting: tuple[np.ndarray, ...] = ()
+
+
 class ControllerState(NamedTuple):
     """What a controller knows from earlier steps.
 
@@ -19,6 +33,8 @@ class ControllerState(NamedTuple):
         pending: inputs that were decided but do not act yet, oldest first.
         misses: solver runs in a row without a plan that meets the constraints.
         solver_raised: whether the solver raised at the last step: it is built again.
+        seen: the last whole measurement, to count on from where one is missing; None: there was
+            none, or it is not known what has acted since.
     """
 
     steps_late: int
@@ -28,6 +44,7 @@ class ControllerState(NamedTuple):
     pending: tuple[np.ndarray, ...]
     misses: int
     solver_raised: bool = False
+    seen: Seen | None = None
 
     @classmethod
     def at_start(cls, steps_late: int, acting: np.ndarray | None) -> "ControllerState":
@@ -59,6 +76,7 @@ class ControllerState(NamedTuple):
         solver_ran: bool,
         meets_constraints: bool = True,
         solver_raised: bool = False,
+        seen: Seen | None = None,
     ) -> "ControllerState":
         """Return what is known after a step.
 
@@ -68,14 +86,19 @@ class ControllerState(NamedTuple):
             solver_ran: whether the solver was run.
             meets_constraints: whether the new plan does; else it violates them least.
             solver_raised: whether the solver raised something.
+            seen: the measurement of this step; None where it was missing.
         """
         plan = new_plan or self.plan
         misses = 0 if new_plan and meets_constraints else self.misses + solver_ran
         late, initial = self.steps_late, self.initial_input
         if given is None:
             return ControllerState(
-                late, initial, plan, self.input, self.pending, misses, solver_raised
+                late, initial, plan, self.input, self.pending, misses, solver_raised, seen
             )
         ahead = (*self.pending, given)
         pending = ahead[max(0, len(ahead) - late) :]
-        return ControllerState(late, initial, plan, given, pending, misses, solver_raised)
+        if seen is not None:
+            since = seen._replace(acting=ahead) if len(ahead) == late + 1 else None
+        else:
+            since = self.seen and self.seen._replace(acting=(*self.seen.acting, given))
+        return ControllerState(late, initial, plan, given, pending, misses, solver_raised, since)

@@ -119,6 +119,7 @@ class FallbackLadder:
             solver_ran=solver_ran,
             meets_constraints=meets,
             solver_raised=solved.raised or bool(broken),
+            seen=inputs.seen,
         )
         report = StepReport(
             t=inputs.t,

@@ -16,6 +16,7 @@ from ocp.files.append import append, sync
 from ocp.files.archive import named
 from ocp.files.draft import write_file
 from ocp.files.frame import framed
+from ocp.mpc.controller_state import Seen
 from ocp.mpc.mpc import MPC
 from ocp.mpc.record_file import Header, read_header, records
 from ocp.mpc.record_format import Record, packed
@@ -162,7 +163,7 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
                 yield found
         if not wanted:
             return
-        missing = missing_measurement(mpc.ocp, record.measured)
+        missing = missing_measurement(mpc.ocp, record.measured, state.seen)
         solver_ran = record.parameters_known and not missing
         state = state.after(
             record.input,
@@ -170,6 +171,7 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
             solver_ran=solver_ran,
             meets_constraints=record.source is not InputSource.LEAST_VIOLATING,
             solver_raised=solver_ran and record.status is None,
+            seen=None if missing else Seen(record.t, record.measured),
         )
     if wanted:
         raise ProblemError(f"{path} has no step {min(wanted)}")

@@ -88,6 +88,9 @@ class InputLimits:
         inside = bounds.clip(given)
         if not self._rows or self._rows_hold(inside, at):
             return inside
+        if not np.isfinite(self._values(inside, at)).all():
+            # Nobody knows where the actuator is: where the input moves it, it stays.
+            return bounds.clip(np.zeros_like(given)) if self.ocp.model.u_is_change else inside
         if self._columns is not None:
             return self._interval(bounds, at).clip(inside)
         # A start at which a slope vanishes, as the middle of a ring, leads nowhere: others may.
@@ -114,6 +117,8 @@ class InputLimits:
         if self._rows_hold(given, at):
             return ""
         values = self._values(given, at)[None, :]
+        if not np.isfinite(values).all():
+            return "without a measurement a limit of the input is not known"
         return str(self._rows.largest_violation(values, np.array([at.t])))
 
     def _interval(self, bounds: Box, at: Instant) -> Box:

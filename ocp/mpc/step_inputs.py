@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_numeric, check_real
 from ocp.checks.errors import ProblemError
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
-from ocp.mpc.controller_state import ControllerState
+from ocp.mpc.controller_state import ControllerState, Seen
 from ocp.mpc.plan_check import HorizonParameters, PlanCheck
 from ocp.mpc.plant_input import PlantInput
 from ocp.problem.cache import once_per_problem
@@ -20,6 +20,8 @@ from ocp.problem.scaled import sizes_of
 
 # A measurement beyond this many sizes of its state is none: a sensor's largest number.
 _ABSURD = 1e8
+# A first one beyond this is none, whatever the sizes.
+_NUMBERS = 1e20
 
 # t [s] -> parameters and signals of the horizon that starts there, by name.
 Parameters = Callable[[float], Mapping[str, ArrayLike]]
@@ -32,11 +34,12 @@ class StepInputs(NamedTuple):
         t: when the state was measured [s].
         applies_at: when the input acts [s].
         start: the state then (nx,), predicted where need be; of the last plan where nothing is
-            measured, NaN for what is missing where there is no plan either.
+            measured, NaN for what is missing where nothing was ever measured.
         parameters: of the horizon from ``applies_at`` on.
         now: parameters when the input acts (n_p,).
         parameters_known: False where they are those of the last plan, as far as they reach.
         unsolvable: why the solver cannot be run; empty where it can.
+        seen: the measurement, where it is whole.
     """
 
     t: float
@@ -46,6 +49,7 @@ class StepInputs(NamedTuple):
     now: np.ndarray
     parameters_known: bool
     unsolvable: str
+    seen: Seen | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,21 +72,37 @@ class InputCollector:
         self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
     ) -> StepInputs:
         """Check the measurement, get the parameters, and predict the state over the delay."""
-        name, nx, plan = self.ocp.name, self.ocp.model.nx, state.plan
+        name, nx = self.ocp.name, self.ocp.model.nx
         applies_at = check_real(t, f"MPC of {name}: t [s]") + self.delay
         start = check_numeric(x, f"MPC of {name}: x")
         if start.shape != (nx,):
             raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
         p, unknown = self._horizon_parameters(state, applies_at, given)
-        missing = missing_measurement(self.ocp, start)
-        at_effect = p.at(applies_at)
+        missing = missing_measurement(self.ocp, start, state.seen)
+        at_effect, seen = p.at(applies_at), None if missing else Seen(float(t), start.copy())
         if missing:
-            start = present(self.ocp, start) if plan is None else plan.state(applies_at)
+            start = self._expected(state, start, applies_at, at_effect)
         elif self.compensate and state.pending:
             for k, sent in enumerate(state.pending):
                 start = self._next_state(start, sent, t + k * self.dt, at_effect)
         unsolvable = joined(unknown, missing)
-        return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable)
+        return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable, seen)
+
+    def _expected(
+        self, state: ControllerState, measured: np.ndarray, t: float, p: np.ndarray
+    ) -> np.ndarray:
+        """Return where the model is at t [s] from the last whole measurement on; else NaN parts.
+
+        What acted in between is known, and may be something else than the last plan.
+        """
+        seen = state.seen
+        count = 0 if seen is None else round((t - seen.t) / self.dt)
+        if seen is None or len(seen.acting) < count:
+            return _present(self.ocp, measured) if state.plan is None else state.plan.state(t)
+        x = seen.x
+        for k, sent in enumerate(seen.acting[:count]):
+            x = self._next_state(x, sent, seen.t + k * self.dt, p)
+        return x
 
     def _horizon_parameters(
         self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
@@ -110,11 +130,23 @@ class InputCollector:
         return self.check.next_state(x, given, t, p)
 
 
-def missing_measurement(ocp: OCP, measured: np.ndarray) -> str:
-    """Return why a measured state (nx,) counts as missing; empty where it does not."""
+def missing_measurement(ocp: OCP, measured: np.ndarray, seen: Seen | None) -> str:
+    """Return why a measured state (nx,) counts as missing; empty where it does not.
+
+    Args:
+        ocp: the problem.
+        measured: the state.
+        seen: the last one that did not; None: there is none to compare with.
+    """
     values, plausible = measured.tolist(), _plausible(ocp)
     each = zip(values, plausible, strict=True)
     if all([-most <= value <= most for value, most in each]):
+        return ""
+    # A problem may have been declared elsewhere than it is used.
+    most = np.full(len(values), _NUMBERS)
+    if seen is not None:
+        most = np.array(plausible) * max(1.0, _ABSURD * (np.abs(seen.x) / plausible).max())
+    if (np.abs(measured) <= most).all():
         return ""
     if not all(map(isfinite, values)):
         return "the measurement is not finite"
@@ -122,7 +154,7 @@ def missing_measurement(ocp: OCP, measured: np.ndarray) -> str:
     return f"the measurement {ocp.model.x_names[worst]} = {values[worst]:.3g} cannot be meant"
 
 
-def present(ocp: OCP, measured: np.ndarray) -> np.ndarray:
+def _present(ocp: OCP, measured: np.ndarray) -> np.ndarray:
     """Return a measured state (nx,) with NaN for what is missing."""
     return np.where(np.abs(measured) <= _plausible(ocp), measured, np.nan)
 

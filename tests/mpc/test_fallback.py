@@ -152,13 +152,20 @@ def test_a_choice_that_is_none(choice):
         MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, backup=choice)
 
 
-def test_without_a_state_the_suggested_law_holds():
-    mpc = always_failing(cart())
-    given = mpc.step([0.5, 0.0], 0.0).input
-    decision = mpc.step([np.nan, 0.0], DT)
-    assert decision.input == given
-    assert "the backup law returned" in decision.message
-    assert decision.message.endswith("backup: hold")
+def test_without_a_state_the_suggested_law_goes_by_the_model():
+    """What acted since the last measurement is known, and where that leads."""
+    blind, seeing = always_failing(cart()), always_failing(cart())
+    given = blind.step([0.5, 0.0], 0.0).input[0]
+    seeing.step([0.5, 0.0], 0.0)
+    decision = blind.step([np.nan, 0.0], DT)
+    expected = [0.5 + DT**2 / 2 * given, DT * given]
+    np.testing.assert_allclose(decision.input, seeing.step(expected, DT).input)
+    assert "not finite" in decision.message
+
+
+def test_without_any_state_there_is_nothing_to_go_by():
+    with pytest.raises(ControlRefused, match="no input to hold"):
+        always_failing(cart()).step([np.nan, 0.0], 0.0)
 
 
 # -- what it does ------------------------------------------------------------------------------
