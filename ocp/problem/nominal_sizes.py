@@ -28,8 +28,6 @@ from ocp.problem.parameters import Signal
 _BOUND, _GIVEN, _DYNAMICS, _RATE, _COST, _ROW = 2.0, 1.0, 1.0, 0.2, 0.3, 0.5
 # What is left of terms that cancel, relative to them, is rounding.
 _ROUNDING = 1e-9
-# A value of the cost below this part of the largest says nothing of its size.
-_TINY = 1e-4
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
@@ -97,8 +95,7 @@ def nominal_sizes(ocp: OCP) -> Sizes:
         equations = [*known, *at_points]
         for point, beside in zip(points, _displaced(ocp, points, np.exp(log_sizes)), strict=True):
             equations += [*functions.equations(beside), *functions.of_curvature(point, beside)]
-            equations += functions.of_values(beside)
-        log_sizes = _solved(_without_tiny_costs(equations, size - 1), size)
+        log_sizes = _solved(equations, size)
     nx = ocp.model.nx
     x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
     if ocp.model.x_nominal is not None:
@@ -185,21 +182,14 @@ class _Functions:
                 curvature = share * abs(change[j] / moved[j])
                 yield _Equation(_COST, (len(moved),), (j, j), float(np.log(curvature)))
 
-    def of_values(self, point: _Point) -> Iterator[_Equation]:
-        """Yield what values of the cost at a point, and its parts by parameter, say of its size."""
-        values = [np.array(v).ravel() for v in self.costs(*point)]
-        cost = len(values[1])
-        for share, (value, _, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
-            own = share * np.concatenate([value, by_p * point.p])
-            for size in own[_usable(own)]:
-                yield _Equation(_COST, (cost,), (), float(np.log(abs(size))))
-
     def of_costs(self, point: _Point) -> Iterator[_Equation]:
         """Yield what values and slopes of the cost at a point say of the sizes."""
         values = [np.array(v).ravel() for v in self.costs(*point)]
         cost = len(values[1])  # its place among the sizes
-        yield from self.of_values(point)
-        for share, slope in ((self.horizon, values[1]), (1.0, values[4])):
+        for share, (value, slope, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
+            own = share * np.concatenate([value, by_p * point.p])
+            for size in own[_usable(own)]:
+                yield _Equation(_COST, (cost,), (), float(np.log(abs(size))))
             for j in np.flatnonzero(_usable(slope)).tolist():
                 yield _Equation(_COST, (cost,), (j,), float(np.log(share * abs(slope[j]))))
 
@@ -293,16 +283,6 @@ def _offset(c: Constraint, value: np.ndarray) -> np.ndarray:
 
 def _usable(values: np.ndarray) -> np.ndarray:
     return np.isfinite(values) & (values != 0.0)
-
-
-def _without_tiny_costs(equations: list[_Equation], cost: int) -> list[_Equation]:
-    """Leave out values of the cost that are next to nothing beside others, as far from a hill."""
-
-    def is_value(equation: _Equation) -> bool:
-        return equation.plus == (cost,) and not equation.minus
-
-    largest = max((e.value for e in equations if is_value(e)), default=0.0)
-    return [e for e in equations if not is_value(e) or e.value >= largest + np.log(_TINY)]
 
 
 def _solved(equations: Iterable[_Equation], size: int) -> np.ndarray:

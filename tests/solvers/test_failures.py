@@ -15,6 +15,7 @@ from ocp import (
     Box,
     Constraint,
     Guess,
+    Model,
     ProblemError,
     Solution,
     Solver,
@@ -310,3 +311,22 @@ def test_a_bad_guess_is_survived(solver: Solver) -> None:
 def test_success_is_silent_too(solver: Solver) -> None:
     solution = solve(changed(van_der_pol(), horizon=1.0), solver)
     assert np.isfinite(solution.x).all()
+
+
+@pytest.mark.parametrize(
+    "solver", [MultipleShooting(40), MultipleShooting(40, backend="fatrop"), Collocation(20)]
+)
+def test_a_cost_that_is_tiny_at_the_start_hides_no_way(solver) -> None:
+    """Beyond a hill the size of the cost is a million times larger: the end was INFEASIBLE."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)
+    hill = OCP(
+        name="hill",
+        model=Model(name="integrator", x=x, u=u, f=u),
+        x0=[-1.0, 0.0],
+        horizon=1.0,
+        running_cost=ca.sumsqr(u) + 30 * ca.exp(-10 * ca.sumsqr(x)),
+        constraints=(Constraint("end", x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
+    )
+    found = solve(hill, solver)
+    assert found.status.is_success, found.message
+    assert found.cost == pytest.approx(6.013, rel=1e-3)
