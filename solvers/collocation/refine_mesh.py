@@ -80,7 +80,7 @@ def refine_mesh(
     *,
     solver: Collocation | None = None,
     accuracy: float = 1e-8,
-    rounds: int = 15,
+    rounds: int = 20,
 ) -> MeshRefinement:
     """Collocate again and again, on finer intervals or with higher degrees where it is needed.
 
