@@ -7,6 +7,9 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ocp.method.judged import judged
+from ocp.method.method_program import MethodProgram
+from ocp.method.method_solver import MethodSolver
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP
@@ -20,11 +23,13 @@ class ScaledProgram(Program):
 
     Attributes:
         ocp: the scaled problem.
-        program: solves it.
+        program: solves it, and compares nothing with the referee, unless it does by itself.
+        solver: the options.
     """
 
     ocp: ScaledOCP
     program: Program
+    solver: MethodSolver
 
     @property
     def is_stateful(self) -> bool:
@@ -50,7 +55,11 @@ class ScaledProgram(Program):
             guess=None if given is None else _ScaledGuess(given, sizes),
         )
         answer = in_original_units(solution, self.ocp)
-        return answer.with_(x0=data.x0, solve_time=perf_counter() - started)
+        answer = answer.with_(x0=data.x0, solve_time=perf_counter() - started)
+        # In the units of the user, as every number in a message is.
+        if not self.solver.judged or not isinstance(self.program, MethodProgram):
+            return answer
+        return judged(answer, self.solver.success_accuracy, slack=self.solver.end_slack)
 
 
 def in_original_units(solution: Solution, ocp: ScaledOCP) -> Solution:

@@ -49,7 +49,7 @@ class ScalingSolver(MethodSolver):
         in_sizes = scaled(ocp)
         if in_sizes is None:
             return self.prepare(ocp)
-        return ScaledProgram(in_sizes, self.prepare(in_sizes))
+        return ScaledProgram(in_sizes, self.unjudged().prepare(in_sizes), self)
 
     @abstractmethod
     def prepare(self, ocp: OCP) -> Program:
