@@ -259,3 +259,27 @@ def test_nominal_sizes_follow_the_units(metre: float, second: float) -> None:
     scale = np.array([length, length / time, length / time])
     np.testing.assert_allclose(other.x * scale, one.x, rtol=1e-6)
     np.testing.assert_allclose(other.u, one.u, rtol=1e-6)
+
+
+def test_a_row_with_margins_is_measured_as_before() -> None:
+    """A motor that is weaker the faster it turns, in metres and in millimetres."""
+
+    def motor(unit: float) -> OCP:
+        x, v, u = (ca.SX.sym(name) for name in "xvu")
+        return OCP(
+            name="motor",
+            model=Model(name="m", x=ca.vertcat(x, v), u=u, f=ca.vertcat(v, unit * u)),
+            x0=[unit, 0.0],
+            horizon=3.0,
+            running_cost=(x / unit) ** 2 + 0.05 * u**2,
+            control_bounds=Box(-3.0, 3.0),
+            state_bounds=Box([-np.inf, -0.7 * unit], [np.inf, np.inf]),
+            constraints=(Constraint("torque", u + v / unit, -1.0, 1.0),),
+        )
+
+    solver = BetweenNodes(MultipleShooting(15), tolerance=0.2)
+    plain, other = solve(motor(1.0), solver), solve(motor(1e3), solver)
+    assert plain.status is other.status is Status.SOLVED
+    assert not plain.is_scaled
+    assert other.is_scaled
+    assert other.cost == pytest.approx(plain.cost, rel=1e-6)
