@@ -46,7 +46,7 @@ from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
 from ocp.problem.run_data import RunData
-from ocp.problem.scaled import ScaledOCP, scaled, sizes_of
+from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.start_feasibility import start_violation
 from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
@@ -122,6 +122,7 @@ __all__ = [
     "time_unit",
     "walk",
     "with_checksum",
+    "with_row_sizes",
     "without_checksum",
     "write_file",
 ]

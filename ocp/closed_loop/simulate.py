@@ -177,13 +177,13 @@ class _Journal:
     def rollout(self) -> Rollout:
         """Return what was recorded."""
         t, x = np.array(self.t), np.array(self.x)
-        m = self.ocp.model
+        m, steps = self.ocp.model, len(self.inputs)
         return Rollout(
             plant=self.ocp,
             t=t,
             x=x,
-            measured=np.array(self.measured).reshape(-1, m.nx),
-            inputs=np.array(self.inputs).reshape(-1, m.nu),
+            measured=np.array(self.measured).reshape(steps, m.nx),
+            inputs=np.array(self.inputs).reshape(steps, m.nu),
             sources=tuple(d.source for d in self.decisions),
             messages=tuple(d.message for d in self.decisions),
             costs=np.array(self.costs),

@@ -10,6 +10,7 @@ import numpy as np
 from ocp.checks.errors import ProblemError
 from ocp.linear.node_function import NodeFunction
 from ocp.problem.constraint import Box
+from ocp.problem.constraint_rows import ConstraintRow
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 
@@ -127,10 +128,9 @@ class LinearQuadratic:
 
     Attributes:
         ocp: the problem.
-        rows: name of each row at nodes 0..N-1.
-        end_rows: name of each row at node N.
+        rows: what each row at nodes 0..N-1 is.
+        end_rows: what each row at node N is.
         on_control: whether a row has a control in it, (rows,).
-        limits_input: whether a row limits what is sent, as a bound of a control does, (rows,).
         stage_matrices: (t, parameters) -> A, B, Q, S, R, D_x, D_u.
         stage_vectors: (t, parameters) -> (c, q, r, constant, offset of the rows), one column.
         end_matrices: (t, parameters) -> P, D_f.
@@ -140,10 +140,9 @@ class LinearQuadratic:
     """
 
     ocp: OCP
-    rows: tuple[str, ...]
-    end_rows: tuple[str, ...]
+    rows: tuple[ConstraintRow, ...]
+    end_rows: tuple[ConstraintRow, ...]
     on_control: np.ndarray
-    limits_input: np.ndarray
     stage_matrices: ca.Function
     stage_vectors: ca.Function
     end_matrices: ca.Function

@@ -9,7 +9,7 @@ from ocp.checks.arguments import check_instance
 from ocp.checks.errors import UnsupportedProblem
 from ocp.linear.linear_quadratic import LinearQuadratic
 from ocp.linear.polynomial import beyond
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 
 
@@ -119,63 +119,29 @@ def _assemble(ocp: OCP, terms: Terms) -> LinearQuadratic:
     inputs, v = [m.t, ocp.p], ca.vertcat(m.x, m.u)
     for c in ocp.constraints:
         require_degree(ocp, c.expression, 1, f"{c.at} constraint '{c.name}'")
-    path = [*_path_rows(ocp.at("path")), *_box_rows(ocp.state_bounds, m.x)]
-    on_control = [ca.which_depends(r.expression, m.u, 1, True)[0] for r in path]
-    bounds = _box_rows(ocp.control_bounds, m.u)
-    rows = path + bounds
-    end = [r for r, depends in zip(path, on_control, strict=True) if not depends]
-    end += _path_rows(ocp.at("terminal"))
-    d, d_0 = _affine(_stack(rows), v)
-    d_f, d_f0 = _affine(_stack(end), m.x)
+    path = ocp.rows.path + _bounded(ocp.rows.states)
+    rows = path + _bounded(ocp.rows.controls)
+    end = path.where(~path.on_control) + ocp.rows.terminal
+    d, d_0 = _affine(rows.expression, v)
+    d_f, d_f0 = _affine(end.expression, m.x)
     hessian, slope, constant = _quadratic(ca.SX(ocp.terminal_cost), m.x)
     blocks = [s.A, s.B, s.Q, s.S, s.R, d[:, : m.nx], d[:, m.nx :]]
     vectors = ca.vertcat(s.c, s.q, s.r, s.constant, d_0)
     end_vectors = ca.vertcat(slope / 2, constant, d_f0)
     return LinearQuadratic(
         ocp=ocp,
-        rows=tuple(r.name for r in rows),
-        end_rows=tuple(r.name for r in end),
-        on_control=np.array(on_control + [True] * len(bounds), dtype=bool),
-        limits_input=np.array(_limits_input(ocp, len(path)) + [True] * len(bounds), dtype=bool),
+        rows=rows.rows,
+        end_rows=end.rows,
+        on_control=rows.on_control,
         stage_matrices=ca.Function("stage_matrices", inputs, [ca.densify(b) for b in blocks]),
         stage_vectors=ca.Function("stage_vectors", inputs, [ca.densify(vectors)]),
         end_matrices=ca.Function("end_matrices", inputs, [hessian / 2, ca.densify(d_f)]),
         end_vectors=ca.Function("end_vectors", inputs, [ca.densify(end_vectors)]),
-        row_box=_box(rows),
-        end_box=_box(end),
+        row_box=rows.box,
+        end_box=end.box,
     )
 
 
-def _limits_input(ocp: OCP, count: int) -> list[bool]:
-    """Return which of the path's rows limit what is sent; bounds of states, behind them, do not."""
-    own = [row.kind == "input" for row in ocp.rows.path.rows]
-    return own + [False] * (count - len(own))
-
-
-def _path_rows(constraints: tuple[Constraint, ...]) -> list[Constraint]:
-    """Return every row of constraints as a constraint of its own."""
-    return [
-        Constraint(c.name, c.expression[i], np.asarray(c.lower)[i], np.asarray(c.upper)[i])
-        for c in constraints
-        for i in range(c.size)
-    ]
-
-
-def _box_rows(box: Box, symbols: ca.SX) -> list[Constraint]:
-    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
-    return [
-        Constraint(f"bound of {symbols[i]}", symbols[i], lower[i], upper[i])
-        for i in range(symbols.numel())
-        if np.isfinite(lower[i]) or np.isfinite(upper[i])
-    ]
-
-
-def _stack(rows: list[Constraint]) -> ca.SX:
-    return ca.vertcat(ca.SX(0, 1), *[r.expression for r in rows])
-
-
-def _box(rows: list[Constraint]) -> Box:
-    return Box(
-        np.array([np.asarray(r.lower)[0] for r in rows]),
-        np.array([np.asarray(r.upper)[0] for r in rows]),
-    )
+def _bounded(rows: ConstraintRows) -> ConstraintRows:
+    """Return the rows that have a bound."""
+    return rows.where(np.isfinite(rows.box.lower) | np.isfinite(rows.box.upper))

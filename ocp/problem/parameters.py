@@ -141,7 +141,8 @@ class ParameterValues:
         values = tuple(np.asarray(e.checked(given.pop(e.name, e.value))) for e in entries)
         if given:
             known = ", ".join(e.name for e in entries) or "none"
-            raise ProblemError(f"unknown parameters: {', '.join(given)}; declared are: {known}")
+            unknown = ", ".join(map(str, given))
+            raise ProblemError(f"unknown parameters: {unknown}; declared are: {known}")
         return cls(tuple(entries), values)
 
     def at(self, fraction: ArrayLike, side: Literal[-1, 1] = 1) -> np.ndarray:

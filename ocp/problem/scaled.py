@@ -7,7 +7,7 @@ r"""The same problem with states, controls, cost and rows measured in sizes of t
 Time, parameters and signals keep their units.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -127,6 +127,18 @@ class ScaledOCP(OCP):
             initial=_with_units(rows.initial, of_constraint["initial"]),
             terminal=_with_units(rows.terminal, of_constraint["terminal"]),
         )
+
+
+def with_row_sizes(ocp: OCP, sizes: Mapping[str, np.ndarray]) -> OCP:
+    """Return a problem with what the rows of constraints are measured in that a method gave it.
+
+    Args:
+        ocp: made of a problem by ``dataclasses.replace``; only one in sizes of its own is changed.
+        sizes: of the rows of each new constraint, by name.
+    """
+    if not isinstance(ocp, ScaledOCP):
+        return ocp
+    return replace(ocp, sizes=replace(ocp.sizes, rows={**ocp.sizes.rows, **sizes}))
 
 
 def _with_units(rows: ConstraintRows, sizes: np.ndarray) -> ConstraintRows:

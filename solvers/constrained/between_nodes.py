@@ -31,6 +31,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     judged,
+    with_row_sizes,
 )
 from solvers.constrained.standard_form import StandardForm
 from solvers.direct.multiple_shooting import MultipleShooting
@@ -249,14 +250,17 @@ def _tightened(ocp: OCP, rows: StandardForm, intervals: int) -> OCP:
     margin = ca.SX.sym("margin", rows.size)
     shifted = ca.if_else(ca.DM(rows.is_equation.astype(float)), rows.c, rows.c + margin)
     constraints = [c for c in ocp.constraints if c.at != "path"]
+    sizes = {}
     for name, group in groupby(range(rows.size), key=lambda i: rows.rows[i].name):
         members = list(group)
         lower = np.where(rows.is_equation[members], 0.0, -np.inf)
         constraints.append(Constraint(name, shifted[members], lower, 0.0))
+        sizes[name] = np.array([rows.rows[i].unit for i in members])
     samples = np.zeros((intervals + 1, rows.size))
-    return replace(
+    tightened = replace(
         ocp,
         state_bounds=Box(),
         constraints=tuple(constraints),
         parameters=(*ocp.parameters, Signal(_MARGIN, margin, samples, hold="linear")),
     )
+    return with_row_sizes(tightened, sizes)

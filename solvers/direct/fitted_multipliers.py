@@ -112,6 +112,11 @@ def _fit(rows: csr_matrix, wanted: np.ndarray) -> np.ndarray:
 
 
 def _share(part: np.ndarray | float, whole: np.ndarray | float) -> float:
-    """Return the largest part relative to the largest whole; 0 where there is no part."""
-    largest = float(np.max(part, initial=0.0))
-    return largest / float(np.max(whole)) if largest > 0.0 else 0.0
+    """Return the largest part relative to the largest whole; 0 where there is no part.
+
+    inf where there is a part of nothing: multipliers of a problem without a cost.
+    """
+    largest, total = float(np.max(part, initial=0.0)), float(np.max(whole, initial=0.0))
+    if largest == 0.0:
+        return 0.0
+    return largest / total if total > 0.0 else np.inf

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ocp.internal import LinearQuadratic, LQData, Matrices
+from ocp.internal import ConstraintRow, LinearQuadratic, LQData, Matrices
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.qp.quadratic_program import QpVectors
 from solvers.linear.stacked_prediction import StackedPrediction
@@ -16,11 +16,24 @@ Trajectory = tuple[np.ndarray, np.ndarray]
 
 
 class FormPosition(NamedTuple):
-    """What a row of the program says, for messages."""
+    """What a row of the program says, for messages and penalties.
+
+    Attributes:
+        name: of the constraint, or of the bound.
+        node: where it holds, 0 to N.
+        limits_input: whether it limits what is sent, so that no penalty makes it soft.
+        unit: what a violation of 1 is in the units of the user.
+    """
 
     name: str
     node: int
     limits_input: bool
+    unit: float
+
+    @classmethod
+    def of(cls, row: ConstraintRow, node: int) -> "FormPosition":
+        """Return what a row says at a node where an input is sent."""
+        return cls(row.name, node, row.kind == "input", row.unit)
 
 
 class MPCForm(ABC):
@@ -40,14 +53,10 @@ class MPCForm(ABC):
         """Name the rows."""
         self.lq, self.equations = lq, equations
         self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
-        stage = list(zip(lq.rows, lq.limits_input, strict=True))
-        first = [
-            FormPosition(*row[:1], 0, row[1])
-            for row, on in zip(stage, lq.on_control, strict=True)
-            if on
-        ]
-        later = [FormPosition(name, k, bound) for k in range(1, lq.steps) for name, bound in stage]
-        last = [FormPosition(name, lq.steps, False) for name in lq.end_rows]
+        on_control = [row for row, on in zip(lq.rows, lq.on_control, strict=True) if on]
+        first = [FormPosition.of(row, 0) for row in on_control]
+        later = [FormPosition.of(row, k) for k in range(1, lq.steps) for row in lq.rows]
+        last = [FormPosition(row.name, lq.steps, False, row.unit) for row in lq.end_rows]
         self.places = (*first, *later, *last)
 
     @abstractmethod

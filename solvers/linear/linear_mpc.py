@@ -15,8 +15,10 @@ from ocp.internal import (
     MethodProgram,
     RunData,
     RunResult,
+    ScaledOCP,
     ScalingSolver,
     check_choice,
+    check_flag,
     check_positive,
     elastic,
     scaled,
@@ -58,15 +60,21 @@ class LinearMPC(ScalingSolver):
         form: ``"sparse"`` keeps the states as unknowns, effort linear in the horizon;
             ``"condensed"`` has inputs only (2.83), pre-stabilised: good for short horizons.
         tolerance: largest accepted residual.
-        soft: weight of an exact penalty on exceeding a constraint that does not limit the input
-            (``Constraint(limits_input=...)``); it has to exceed the constraints' multipliers.
-            None: hard.
+        soft: weight w of an exact penalty w (e + e^2 / 2) at each step on exceeding a constraint
+            that does not limit the input (``Constraint(limits_input=...)``) by e, all in the units
+            in which the problem is written; it has to exceed the constraints' multipliers. None:
+            hard.
+
+    Attributes:
+        soft_in_sizes: whether w is a price in the sizes in which the problem is solved instead,
+            the same for every row; see ``least_violating``.
     """
 
     backend: str = "osqp"
     form: Literal["sparse", "condensed"] = "sparse"
     tolerance: float = 1e-8
     soft: float | None = None
+    soft_in_sizes: bool = field(default=False, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Check the options."""
@@ -75,6 +83,7 @@ class LinearMPC(ScalingSolver):
         check_positive(self.tolerance, "LinearMPC: tolerance", below=1.0)
         if self.soft is not None:
             check_positive(self.soft, "LinearMPC: soft")
+        check_flag(self.soft_in_sizes, "LinearMPC: soft_in_sizes")
 
     def imposed(self, ocp: OCP) -> ImposedRows:
         """Return the rows that an answer meets: with a penalty, those that limit the input."""
@@ -85,18 +94,14 @@ class LinearMPC(ScalingSolver):
         relaxed = elastic(scaled(ocp) or ocp)  # it is solved in these sizes
         if relaxed is None or self.soft is not None:
             return None
-        return replace(self.unjudged(), soft=relaxed.penalty).build(ocp)
+        return replace(self.unjudged(), soft=relaxed.penalty, soft_in_sizes=True).build(ocp)
 
     def prepare(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""
         lq = linear_quadratic(ocp)
         form = _FORMS[self.form](lq)
-        softening = None
-        if self.soft is not None:
-            softening = Softening(elastic_rows(form), self.soft)
-        program = LinearMPCProgram(
-            self, ocp, lq, form, qp_backend(self.backend, self.tolerance), softening
-        )
+        backend = qp_backend(self.backend, self.tolerance)
+        program = LinearMPCProgram(self, ocp, lq, form, backend, self._softening(ocp, form))
         program.prepare(lq.sample_matrices(lq.declared) if lq.fixed is None else lq.fixed)
         if self.backend in NEEDS_CURVATURE and not _is_strictly_convex(form.H):
             raise UnsupportedProblem(
@@ -105,6 +110,17 @@ class LinearMPC(ScalingSolver):
                 "another backend"
             )
         return program
+
+    def _softening(self, ocp: OCP, form: MPCForm) -> Softening | None:
+        """Return the penalty, whose weight is in the user's units, in those of the program."""
+        if self.soft is None:
+            return None
+        rows = elastic_rows(form)
+        units, cost = np.ones(len(rows)), 1.0
+        if isinstance(ocp, ScaledOCP) and not self.soft_in_sizes:
+            units = np.array([form.places[i - form.equations].unit for i in rows])
+            cost = ocp.sizes.cost
+        return Softening(rows, self.soft * units / cost, self.soft * units**2 / cost)
 
 
 def elastic_rows(form: MPCForm) -> np.ndarray:
@@ -253,7 +269,8 @@ class LinearMPCProgram(MethodProgram):
         point, excess = least_violation(qp if self.softening else hard, elastic, rows)
         if excess.max(initial=0.0) > _UNAVOIDABLE:
             worst = int(excess.argmax())
-            said = f"{self._where(worst)} cannot be met, it is exceeded by {excess[worst]:.3g}"
+            by = self._in_units(worst, excess[worst])
+            said = f"{self._where(worst)} cannot be met, it is exceeded by {by}"
             return _Verdict(point[:size], np.zeros(rows), Status.INFEASIBLE, said)
         said = (
             f"{self.solver.backend} says '{answer.word}'; residuals: primal {found.primal:.2g}, "
@@ -269,10 +286,14 @@ class LinearMPCProgram(MethodProgram):
         dt = self.lq.ocp.model.dt or 0.0
         return f"'{place.name}' at step {place.node} (t0 + {place.node * dt:.4g} s)"
 
+    def _in_units(self, row: int, excess: float) -> str:
+        """Return by how much a row is exceeded, in the user's units."""
+        return f"{excess * self.form.places[row - self.form.equations].unit:.3g}"
+
     def _exceeded(self, slack: np.ndarray) -> str:
         """Say which soft constraint is exceeded most."""
         if self.softening is None or slack.max(initial=0.0) <= self.solver.tolerance:
             return ""
         worst = int(slack.argmax())
-        where = self._where(int(self.softening.rows[worst]))
-        return f"soft constraint {where} is exceeded by {slack[worst]:.3g}"
+        row, by = int(self.softening.rows[worst]), float(slack[worst])
+        return f"soft constraint {self._where(row)} is exceeded by {self._in_units(row, by)}"

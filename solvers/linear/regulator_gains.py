@@ -107,9 +107,9 @@ def cost(data: LQData, x: np.ndarray, u: np.ndarray, half: np.ndarray) -> float:
 def refuse_constraints(lq: LinearQuadratic, solver: str) -> None:
     """Raise ``UnsupportedProblem`` naming the first bound or constraint."""
     ocp: OCP = lq.ocp
-    names = [*lq.rows, *lq.end_rows]
-    if names:
+    rows = [*lq.rows, *lq.end_rows]
+    if rows:
         raise UnsupportedProblem(
-            f"{ocp.name}: {solver} knows no constraints, and there is '{names[0]}'; "
+            f"{ocp.name}: {solver} knows no constraints, and there is '{rows[0].name}'; "
             "take LinearMPC or MultipleShooting"
         )

@@ -1,6 +1,7 @@
 """Every check on a small problem whose numbers can be worked out by hand."""
 
 import re
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -34,6 +35,7 @@ from tests.tolerances import MINIMISER
 
 # What the elastic problem leaves over: IPOPT's 1e-8, and the weight of its tie break.
 ELASTIC = 1e-3
+X, U = ca.SX.sym("x"), ca.SX.sym("u")
 
 
 def subject(ocp: OCP, intervals: int = 20) -> DiagnosedProblem:
@@ -395,6 +397,50 @@ def test_time_that_vanishes_and_time_without_end():
     shrinking = of.fastest(horizon=FreeTime(2.0), constraints=of.ends({"position": 0.0}))
     assert _first(shrinking) is Cause.VANISHING_TIME
     assert _first(of.cart(horizon=FreeTime(2.0))) is Cause.ENDLESS_TIME
+
+
+def test_a_guess_that_is_too_short_is_no_time_without_end():
+    """100 m at 1 m/s^2, there and at rest, take 20 s; the guess is 0.5 s."""
+    assert _first(minimum_time(distance=100.0, horizon=FreeTime(0.5, 0.1, 1000.0))) is None
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_from_one_bound_to_the_other_is_a_decision_in_any_unit(unit):
+    causes = {f.cause for f in diagnose(minimum_time(unit=unit)).findings}
+    assert Cause.SATURATED not in causes
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e6])
+def test_full_thrust_all_the_time_is_none_in_any_unit(unit):
+    thrust = push(unit, -X, control_bounds=Box(-unit, unit))
+    found = [f.evidence for f in diagnose(thrust).findings if f.cause is Cause.SATURATED]
+    assert found == pytest.approx([unit])
+
+
+def test_a_small_unit_is_no_idleness():
+    """The regulator moves its control by 1e-6, which is 1 in another unit."""
+    regulator = push(1e-6, X**2 + 0.1 * (U / 1e-6) ** 2)
+    assert Cause.NO_GOAL not in {f.cause for f in diagnose(regulator).findings}
+
+
+def push(unit: float, cost: ca.SX, **options: Any) -> OCP:
+    mass = Model(name="mass", x=X, u=U, f=U / unit)
+    return OCP(name="push", model=mass, x0=[1.0], horizon=2.0, running_cost=cost, **options)
+
+
+def minimum_time(
+    *, distance: float = 1.0, unit: float = 1.0, horizon: FreeTime | None = None
+) -> OCP:
+    x, v, u = (ca.SX.sym(name) for name in "xvu")
+    return OCP(
+        name="minimum time",
+        model=Model(name="mass", x=ca.vertcat(x, v), u=u, f=ca.vertcat(v, u / unit)),
+        x0=[distance, 0.0],
+        horizon=horizon or FreeTime(3.0, 0.1, 10.0),
+        running_cost=1.0,
+        control_bounds=Box(-unit, unit),
+        constraints=(Constraint("end", ca.vertcat(x, v), 0.0, 0.0, at="terminal"),),
+    )
 
 
 def test_idle_optimum_and_idle_constraint():

@@ -124,6 +124,12 @@ def test_refuses_names_that_are_not_declared() -> None:
         integrator().parameter_values({"mass": 1.0})
 
 
+def test_names_that_are_no_text_are_refused_alike() -> None:
+    given: Any = {1: 2.0, None: 3.0}
+    with pytest.raises(ProblemError, match="unknown parameters: 1, None; declared are: none"):
+        integrator().parameter_values(given)
+
+
 def test_a_signal_of_a_discrete_problem_has_a_sample_per_node() -> None:
     r = ca.SX.sym("r")
     ocp = lag(parameters=(Signal("r", r, np.zeros(5)),))

@@ -23,6 +23,7 @@ from ocp import (
     Constraint,
     Euler,
     FreeTime,
+    Model,
     Parameter,
     ProblemError,
     Signal,
@@ -144,6 +145,21 @@ def test_data_change_without_rebuilding(backend: Backend) -> None:
     assert evaluate(again).cost == pytest.approx(again.cost, rel=1e-5)  # RK4 of 0.04 s
     # Nothing of it is left over in the next run.
     np.testing.assert_array_equal(program.run().u, first.u)
+
+
+@both
+def test_without_a_cost_the_constraints_are_all(backend: Backend) -> None:
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    ocp = OCP(
+        name="no cost",
+        model=Model(name="mass", x=x, u=u, f=u),
+        x0=1.0,
+        horizon=1.0,
+        constraints=(Constraint("end", x, 0.0, 0.0, at="terminal"),),
+    )
+    solution = solve(ocp, MultipleShooting(10, backend=backend))
+    assert solution.status is Status.SOLVED
+    assert abs(solution.x[-1, 0]) <= 1e-6
 
 
 @both

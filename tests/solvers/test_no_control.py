@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from ocp import (
+    MPC,
     OCP,
     Constraint,
     Model,
+    Plant,
     Solution,
     Solver,
     Status,
@@ -111,3 +113,11 @@ def test_what_builds_on_solvers():
     assert not diagnose(flight()).serious
     starts = multistart(flight(), MultipleShooting(40), starts=2, seed=0)
     assert starts[0].solution.cost == pytest.approx(LEAST, rel=1e-5)
+
+
+def test_a_loop_keeps_a_row_for_each_step():
+    ocp = flight(free=False)
+    rollout = MPC(ocp=ocp, solver=MultipleShooting(5), dt=0.1).run(Plant(ocp=ocp), [0.0, 1.0], 0.3)
+    assert rollout.inputs.shape == (3, 0)
+    assert rollout.measured.shape == (3, 2)
+    assert rollout.x[-1, 1] == pytest.approx(math.exp(-0.3))

@@ -116,6 +116,65 @@ def test_linear_mpc(seed, backend) -> None:
         np.testing.assert_allclose(other.u / units.u, plain.u, atol=1e-5)
 
 
+def speed_limited(length: float = 1.0, cost: float = 1.0) -> OCP:
+    """A cart with a limit of its speed; ``length`` and ``cost``: what 1 m and 1 are."""
+    x, v, u = (ca.SX.sym(name) for name in "xvu")
+    return OCP(
+        name="cart",
+        model=Model(
+            name="cart",
+            x=ca.vertcat(x, v),
+            u=u,
+            f=ca.vertcat(x + 0.1 * v, v + 0.1 * length * u),
+            dt=0.1,
+        ),
+        x0=[3.0 * length, 0.0],
+        horizon=15,
+        running_cost=cost * (10.0 * (x / length) ** 2 + (v / length) ** 2 + 0.1 * u**2),
+        control_bounds=Box(-2.0, 2.0),
+        state_bounds=Box([-9.0 * length, -0.6 * length], [9.0 * length, 0.6 * length]),
+    )
+
+
+@pytest.mark.parametrize(("backend", "form"), [("osqp", "sparse"), ("daqp", "condensed")])
+@pytest.mark.parametrize("length", [1e3, 1e6])
+@pytest.mark.parametrize("price", [0.1, 10.0])
+def test_the_price_of_a_soft_row_is_in_the_units_of_the_user(length, price, backend, form) -> None:
+    """In sizes the answer is that of the problem as it is written."""
+    solver = LinearMPC(soft=price / length**2, backend=backend, form=form)
+    ocp, x0 = speed_limited(length), [3.0 * length, -1.2 * length]
+    found = solver.build(ocp).run(x0=x0)
+    written = solver.prepare(ocp).run(x0=x0)
+    assert found.is_scaled
+    assert found.status is Status.SOLVED
+    assert found.cost == pytest.approx(written.cost, rel=1e-6)
+    assert found.message == written.message
+    excess = (np.abs(found.x[1:, 1]) - 0.6 * length).max()
+    assert found.message.endswith(f"is exceeded by {excess:.3g}")
+
+
+@pytest.mark.parametrize("cost", [1e7, 1e-7])
+def test_the_price_of_a_soft_row_is_in_the_cost_of_the_user(cost) -> None:
+    plain, other = (
+        LinearMPC(soft=3.0 * c).build(speed_limited(cost=c)).run(x0=[3.0, -1.2])
+        for c in (1.0, cost)
+    )
+    assert other.is_scaled
+    assert other.cost / cost == pytest.approx(plain.cost, rel=1e-6)
+    assert other.message == plain.message
+    np.testing.assert_allclose(other.x, plain.x, atol=1e-5)
+
+
+def test_the_least_violating_plan_has_one_price_for_all_rows_in_sizes() -> None:
+    for length in (1.0, 1e3, 1e6):
+        program = LinearMPC().least_violating(speed_limited(length))
+        assert program is not None
+        found = program.run(x0=[3.0 * length, -1.2 * length])
+        assert found.status is Status.SOLVED
+        assert found.cost == pytest.approx(937.9712727, rel=1e-6)
+        assert found.message.endswith(f"is exceeded by {0.4 * length:.3g}")
+
+
 def test_an_axis_in_pascal_moves() -> None:
     """1 mm, |p| <= 2 MPa: the same as a double integrator with |u| <= 2."""
     x, p = ca.SX.sym("x", 2), ca.SX.sym("p")
@@ -259,3 +318,27 @@ def test_nominal_sizes_follow_the_units(metre: float, second: float) -> None:
     scale = np.array([length, length / time, length / time])
     np.testing.assert_allclose(other.x * scale, one.x, rtol=1e-6)
     np.testing.assert_allclose(other.u, one.u, rtol=1e-6)
+
+
+def test_a_row_with_margins_is_measured_as_before() -> None:
+    """A motor that is weaker the faster it turns, in metres and in millimetres."""
+
+    def motor(unit: float) -> OCP:
+        x, v, u = (ca.SX.sym(name) for name in "xvu")
+        return OCP(
+            name="motor",
+            model=Model(name="m", x=ca.vertcat(x, v), u=u, f=ca.vertcat(v, unit * u)),
+            x0=[unit, 0.0],
+            horizon=3.0,
+            running_cost=(x / unit) ** 2 + 0.05 * u**2,
+            control_bounds=Box(-3.0, 3.0),
+            state_bounds=Box([-np.inf, -0.7 * unit], [np.inf, np.inf]),
+            constraints=(Constraint("torque", u + v / unit, -1.0, 1.0),),
+        )
+
+    solver = BetweenNodes(MultipleShooting(15), tolerance=0.2)
+    plain, other = solve(motor(1.0), solver), solve(motor(1e3), solver)
+    assert plain.status is other.status is Status.SOLVED
+    assert not plain.is_scaled
+    assert other.is_scaled
+    assert other.cost == pytest.approx(plain.cost, rel=1e-6)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ocp import Guess
+from ocp.internal import sizes_of
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem
@@ -28,7 +29,8 @@ def _idle(subject: DiagnosedProblem) -> Iterator[Finding]:
     at_end = bool(ocp.at("terminal"))
     if at_end or not u.size or ocp.has_free_time:
         return
-    if np.abs(u - nothing).max() > _SAME * (1.0 + np.abs(u).max()):
+    small = _SAME * (np.minimum(sizes_of(ocp).u, 1.0) + np.abs(u).max(axis=0))
+    if (np.abs(u - nothing) > small).any():
         return
     better = _from_elsewhere(subject)
     if better < subject.trial.cost - _SAME * (1.0 + abs(subject.trial.cost)):
@@ -70,10 +72,13 @@ def _stationary_start(subject: DiagnosedProblem, better: float) -> Finding:
 
 def _saturated(subject: DiagnosedProblem) -> Iterator[Finding]:
     ocp, u = subject.ocp, subject.trial.u
+    lower, upper = np.asarray(ocp.control_bounds.lower), np.asarray(ocp.control_bounds.upper)
     for i, name in enumerate(ocp.model.u_names):
-        for side in ("lower", "upper"):
-            bound = float(np.asarray(getattr(ocp.control_bounds, side))[i])
-            if np.isfinite(bound) and np.abs(u[:, i] - bound).max() <= _SAME * (1 + abs(bound)):
+        for side, bounds in (("lower", lower), ("upper", upper)):
+            # Relative to what the control may move by, which follows its unit.
+            bound, width = float(bounds[i]), float(upper[i] - lower[i])
+            near = _SAME * (width if 0.0 < width < np.inf else 1.0 + abs(bound))
+            if np.isfinite(bound) and np.abs(u[:, i] - bound).max() <= near:
                 unit = subject.unit(name)
                 yield Finding(
                     Cause.SATURATED,

@@ -1,8 +1,9 @@
 """A free final time that shrinks to nothing or grows without end."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
-from ocp import FreeTime
+from ocp import FreeTime, Guess
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem
@@ -11,6 +12,8 @@ from solvers.diagnose.subject import DiagnosedProblem
 _TINY, _AT = 0.05, 0.05
 # Beyond this many times the guess the time has run away.
 _ENDLESS = 20.0
+# It has settled where this many times as long costs more, by this share at least.
+_LONGER, _DEARER = 2.0, 1e-3
 
 
 def free_time(subject: DiagnosedProblem) -> Iterator[Finding]:
@@ -21,8 +24,22 @@ def free_time(subject: DiagnosedProblem) -> Iterator[Finding]:
     duration = subject.trial.duration
     if duration <= horizon.lower * (1.0 + _AT):
         yield _vanishing(horizon, duration)
-    elif duration >= min(_ENDLESS * horizon.guess, horizon.upper * (1.0 - 1e-3)):
+    elif duration >= horizon.upper * (1.0 - 1e-3) or (
+        duration >= _ENDLESS * horizon.guess and not _has_settled(subject, duration)
+    ):
         yield _endless(horizon, duration)
+
+
+def _has_settled(subject: DiagnosedProblem, duration: float) -> bool:
+    """Whether a longer time costs more: then the guess was short, and nothing is endless."""
+    trial, data = subject.trial, subject.data
+    if not trial.status.is_success:
+        return False
+    longer = replace(subject.ocp, horizon=_LONGER * duration, guess=None)
+    found = subject.solver.build(longer).run(
+        x0=data.x0, t0=data.t0, parameters=data.values.as_dict(), guess=Guess(x=trial.x, u=trial.u)
+    )
+    return found.status.is_success and found.cost > trial.cost + _DEARER * abs(trial.cost)
 
 
 def _vanishing(horizon: FreeTime, duration: float) -> Finding:

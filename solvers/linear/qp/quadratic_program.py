@@ -114,18 +114,20 @@ class Softening:
     r"""Rows that may be exceeded, with a penalty.
 
     .. math:: l_i - e_i \le G_i z \le u_i + e_i, \quad e_i \ge 0, \quad
-              \dots + w (e_i + e_i^2/2)
+              \dots + p_i e_i + \tfrac12 c_i e_i^2
 
-    Exact: where the hard program is feasible and w exceeds its multipliers, both have the
+    Exact: where the hard program is feasible and p exceeds its multipliers, both have the
     same solution [Nocedal & Wright 2006, section 17.2].
 
     Attributes:
         rows: which rows, indices (s,).
-        penalty: w, positive.
+        price: p, positive (s,).
+        curvature: c, positive (s,).
     """
 
     rows: np.ndarray
-    penalty: float
+    price: np.ndarray
+    curvature: np.ndarray
 
     def soften(self, h: sp.csc_matrix, g: sp.csc_matrix) -> tuple[sp.csc_matrix, sp.csc_matrix]:
         """Return the matrices H and G of the program with slacks e behind z."""
@@ -137,7 +139,7 @@ class Softening:
         zero = sp.csc_matrix((count, _shape(g)[1]))
         rows = sp.bmat([[g, select], [g[self.rows], unit], [zero, unit]], format="csc")
         return (
-            sp.csc_matrix(sp.block_diag([h, self.penalty * unit], format="csc")),
+            sp.csc_matrix(sp.block_diag([h, sp.diags(self.curvature)], format="csc")),
             sp.csc_matrix(rows),
         )
 
@@ -149,7 +151,7 @@ class Softening:
         hard[self.rows] = -np.inf
         free = np.full(count, np.inf)
         return QpVectors(
-            np.concatenate([g, np.full(count, self.penalty)]),
+            np.concatenate([g, self.price]),
             np.concatenate([hard, low[self.rows], np.zeros(count)]),
             np.concatenate([high, free, free]),
         )
