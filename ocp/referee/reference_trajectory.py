@@ -1,10 +1,12 @@
 """What a solution's controls really do: the trajectory, and one integration of it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from ocp.problem.time_switches import time_switches
 from ocp.referee.control_integrators import Restarts, Steps, integrator_of
 from ocp.referee.implicit_integrator import integrate_implicitly
 from ocp.solution.solution import Solution
@@ -14,6 +16,8 @@ Replay = Literal["open loop", "by segments"]
 
 # By how much the length of steps differs within an interval.
 _UNEVEN = 0.25
+# Of a switch by the clock, as a fraction of the horizon.
+_ASIDE = 2e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,15 +98,22 @@ class Replayed:
         """The number of intervals between two knots."""
         return len(self.knots) - 1
 
-    @property
+    @cached_property
     def knots(self) -> np.ndarray:
-        """Fractions of the horizon between which controls and signals are smooth."""
+        """Fractions of the horizon between which controls, signals and the clock are smooth."""
         solution = self.solution
         if solution.problem.model.is_discrete:
             return solution.fractions
         values = solution.problem.parameter_values(solution.parameters)
+        t0, duration = float(solution.t[0]), solution.duration
         knots = np.union1d(solution.fractions, values.knots)
-        return knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
+        knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
+        switches = time_switches(solution.problem, t0, duration, values)
+        # A step ends before a switch, and another begins behind it.
+        around = np.concatenate([switches - _ASIDE, switches + _ASIDE])
+        around = around[(around > 0.0) & (around < 1.0)]
+        apart = np.abs(around[:, None] - knots).min(axis=1, initial=1.0)
+        return np.union1d(knots, around[apart > 1e-9])
 
     @property
     def node_knots(self) -> np.ndarray:
