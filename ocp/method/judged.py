@@ -139,8 +139,7 @@ def _sizes_of_rows(solution: Solution, rows: ConstraintRows) -> np.ndarray:
     sizes = sizes_of(solution.problem)
     if rows is solution.problem.rows.states:
         return sizes.x
-    names = dict.fromkeys(row.name for row in rows.rows)
-    return np.concatenate([[], *[sizes.rows[name] for name in names]])
+    return sizes.of_rows(rows)
 
 
 def _bounds(rows: ConstraintRows) -> np.ndarray:

@@ -106,20 +106,16 @@ class Elastic(Portable):
 
     @cached_property
     def _sizes(self) -> np.ndarray:
-        sizes, rows = sizes_of(self.original), self.original.rows.path
-        names = dict.fromkeys(row.name for row in rows.rows)
-        path = np.concatenate([[], *[sizes.rows[name] for name in names]])
-        hard = np.array([row.kind == "hard" for row in rows.rows], dtype=bool)
-        return np.concatenate([sizes.x, path[hard]])
+        sizes, path = sizes_of(self.original), self.original.rows.path
+        hard = np.array([row.kind == "hard" for row in path.rows], dtype=bool)
+        return np.concatenate([sizes.x, sizes.of_rows(path)[hard]])
 
     @cached_property
     def _at_end(self) -> ca.SX:
         """The squared relative excess at the end, where no control acts."""
-        rows, sizes = self.original.rows, sizes_of(self.original)
-        free = ~self._along.on_control
-        names = dict.fromkeys(row.name for row in rows.terminal.rows)
-        ends = np.concatenate([[], *[sizes.rows[name] for name in names]])
-        both = self._along.where(free) + rows.terminal
+        terminal, free = self.original.rows.terminal, ~self._along.on_control
+        both = self._along.where(free) + terminal
+        ends = sizes_of(self.original).of_rows(terminal)
         unit = np.concatenate([self._sizes[free], ends])
         total = ca.SX(0)
         for row, value, size in zip(

@@ -20,6 +20,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.problem.constraint import Constraint
+from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
 
@@ -63,6 +64,11 @@ class Sizes:
     u: np.ndarray
     cost: float
     rows: dict[str, np.ndarray]
+
+    def of_rows(self, rows: ConstraintRows) -> np.ndarray:
+        """Return the sizes of rows of constraints, (m,)."""
+        names = dict.fromkeys(row.name for row in rows.rows)
+        return np.concatenate([[], *[self.rows[name] for name in names]])
 
 
 class _Point(NamedTuple):

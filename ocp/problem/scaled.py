@@ -88,13 +88,7 @@ def row_sizes(ocp: OCP) -> RowSizes | None:
     if in_sizes is None:
         return None
     sizes, rows = in_sizes.sizes, ocp.rows
-    path, terminal = (_of_rows(sizes, part) for part in (rows.path, rows.terminal))
-    return RowSizes(sizes.x, sizes.u, path, terminal)
-
-
-def _of_rows(sizes: Sizes, rows: ConstraintRows) -> np.ndarray:
-    names = dict.fromkeys(row.name for row in rows.rows)
-    return np.concatenate([[], *[sizes.rows[name] for name in names]])
+    return RowSizes(sizes.x, sizes.u, sizes.of_rows(rows.path), sizes.of_rows(rows.terminal))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -165,12 +165,13 @@ def _coarse(solution: Solution, effort: CertifyOptions) -> tuple[Solution, str]:
     """
     try:
         return on_grid(solution, effort.intervals), ""
-    except NoEstimateError as reason:
-        said = f"no grid of explicit steps solves it. {reason}"
+    except NoEstimateError as failure:
+        reason = failure
     try:
-        return on_points(solution, effort.intervals), said
+        found = on_points(solution, effort.intervals)
     except (NoEstimateError, UnsupportedProblem):
-        raise UnsupportedProblem(f"{solution.problem.name}: {said}") from None
+        raise UnsupportedProblem(f"{solution.problem.name}: no grid solves it. {reason}") from None
+    return found, f"no grid of explicit steps solves it. {reason}"
 
 
 def _searching(effort: CertifyOptions, coarse: Solution) -> MultipleShooting | Collocation:
