@@ -131,7 +131,10 @@ class _StandInProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         self.work(x0, t0)
-        return self.answer.with_(t=self.answer.t - self.answer.t[0] + t0)
+        x = self.answer.x.copy()
+        if x0 is not None:  # a plan from elsewhere would be refused
+            x[0] = x0
+        return self.answer.with_(t=self.answer.t - self.answer.t[0] + t0, x=x)
 
 
 def _contenders(ocp: OCP) -> dict[str, Solver]:

@@ -103,7 +103,8 @@ class FallbackLadder:
         """
         inputs = self._inputs.collect(state, x, t, parameters)
         solver_ran = not inputs.unsolvable
-        inputs = inputs._replace(unsolvable=joined(inputs.unsolvable, broken))
+        if broken:
+            inputs = inputs._replace(unsolvable=joined(inputs.unsolvable, broken))
         solved = self._solver.solve(inputs, state)
         clock = StepClock(started, self.budget, late)
         selected, reason = self._descend(inputs, state, solved, clock)
@@ -246,6 +247,8 @@ class FallbackLadder:
     ) -> Rung:
         """Move an input into its limits; None if it is not finite, or a plan's and moved far."""
         inside = self._input_limits.nearest(given, now)
+        if inside is given:
+            return SelectedInput(source, given.copy(), 0.0, plan), ""
         # Not finite where the input is not.
         excess = float((np.abs(given - inside) / self._input_sizes).max(initial=0.0))
         if not isfinite(excess):

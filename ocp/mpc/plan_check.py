@@ -142,7 +142,8 @@ class PlanCheck:
             return f"the plan begins at {plan.t[0]:.6g} s, not at {t:.6g} s"
         if abs(plan.duration - self.ocp.duration) > ROUNDING * self.dt:
             return f"the plan is {plan.duration:.6g} s long, not {self.ocp.duration:.6g} s"
-        if (np.abs(plan.x[0] - start) > ROUNDING * (1.0 + np.abs(start))).any():
+        each = zip(plan.x[0].tolist(), start.tolist(), strict=True)
+        if not all([abs(there - here) <= ROUNDING * (1.0 + abs(here)) for there, here in each]):
             return f"the plan begins at {plan.x[0]}, not at {start}"
         return ""
 
