@@ -154,7 +154,12 @@ def ctrl_c(what: str, times: int) -> None:
             print("out")
 
 
-@pytest.mark.parametrize("what", JOBS)
+QUICK = {"ipopt", "loop", "osqp"}
+
+
+@pytest.mark.parametrize(
+    "what", [w if w in QUICK else pytest.param(w, marks=pytest.mark.slow) for w in JOBS]
+)
 def test_ctrl_c_comes_out(what: str) -> None:
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
