@@ -51,15 +51,16 @@ class EpigraphProgram(Program):
         guess: InitialGuess | None = None,
     ) -> Solution:
         """Solve for these data, see ``Program.run``."""
-        original = self.epigraph.original
+        original, written = self.epigraph.original, self.written
         original.first_guess(guess)
-        values = RunData.of(original, x0, t0, parameters).values
-        if self.written and not self.epigraph.holds(values, t0):
-            return self.written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        if written is not None:
+            values = RunData.of(original, x0, t0, parameters).values
+            if not self.epigraph.holds(values, t0):
+                return written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
         answer = self.smooth.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
         # A weight that is negative where nobody looked leaves no lower bound of the cost.
-        if self.written and answer.status is Status.DIVERGED:
-            return self.written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
+        if written is not None and answer.status is Status.DIVERGED:
+            return written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
         if not self.solver.judged:
             return answer
         return judged(answer, self.solver.success_accuracy, slack=self.solver.end_slack)

@@ -158,8 +158,7 @@ def _refuse_blind(ocp: OCP) -> None:
 
 def _contained(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
     """Return which symbols an expression contains, bool (n,)."""
-    structure = np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1.0))
-    return np.asarray(structure.any(axis=0))
+    return np.array(ca.which_depends(expression, symbols, 1, False), dtype=bool)
 
 
 _SUGGESTIONS: tuple[tuple[str, Callable[[OCP, float], ParametricLaw]], ...] = (

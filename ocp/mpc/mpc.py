@@ -8,6 +8,7 @@ from threading import Lock, get_ident
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import (
@@ -135,9 +136,8 @@ class MPC:
         """Check the options, do all symbolic work, and begin without a plan."""
         self._check()
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
-        self.reset()
+        self._begin(None, solver_raised=False)
         self._ladder = self._built()
-        self._ladder.prepare()
 
     def __reduce__(self) -> tuple[Callable[..., "MPC"], tuple[type["MPC"], dict[str, Any], Any]]:
         """Copy and pickle options and ``state``; the copy builds its own solver."""
@@ -146,7 +146,7 @@ class MPC:
 
     def _built(self) -> FallbackLadder:
         solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
-        return FallbackLadder(
+        ladder = FallbackLadder(
             ocp=self.ocp,
             program=solver.build(self.ocp),
             least=solver.least_violating(self.ocp) if self.least_violating else None,
@@ -162,6 +162,8 @@ class MPC:
             tolerance=self.tolerance,
             compiled=self.compiled,
         )
+        ladder.prepare()
+        return ladder
 
     def _check(self) -> None:
         check_instance(self.ocp, OCP, "MPC: ocp")
@@ -202,9 +204,11 @@ class MPC:
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
         with self._alone():
-            raised = hasattr(self, "state") and self.state.solver_raised
-            begun = ControllerState.at_start(delay_steps(self.delay, self.dt), first)
-            self.state = begun._replace(solver_raised=raised)
+            self._begin(first, solver_raised=self.state.solver_raised)
+
+    def _begin(self, acting: np.ndarray | None, *, solver_raised: bool) -> None:
+        begun = ControllerState.at_start(delay_steps(self.delay, self.dt), acting)
+        self.state = begun._replace(solver_raised=solver_raised)
 
     def step(
         self,
