@@ -17,6 +17,8 @@ def check_numeric(values: ArrayLike, what: str) -> np.ndarray:
     Text, truth values, complex numbers and arrays with masked entries are refused: NumPy would
     convert some of them silently.
     """
+    if type(values) is np.ndarray and values.dtype == float:  # nothing to look for
+        return values.copy()
     if np.ma.is_masked(values):
         raise ProblemError(f"{what} has masked entries; fill or leave them out")
     try:

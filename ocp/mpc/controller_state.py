@@ -98,7 +98,7 @@ class ControllerState(NamedTuple):
         ahead = (*self.pending, given)
         pending = ahead[max(0, len(ahead) - late) :]
         if seen is not None:
-            since = seen._replace(acting=ahead) if len(ahead) == late + 1 else None
+            since = Seen(seen.t, seen.x, ahead) if len(ahead) == late + 1 else None
         else:
             since = self.seen and self.seen._replace(acting=(*self.seen.acting, given))
         return ControllerState(late, initial, plan, given, pending, misses, solver_raised, since)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -122,7 +122,7 @@ class FallbackLadder:
             solver_raised=solved.raised or bool(broken),
             seen=inputs.seen,
         )
-        report = StepReport(
+        report: dict[str, Any] = dict(
             t=inputs.t,
             applies_at=inputs.applies_at,
             status=solved.status,
@@ -135,20 +135,22 @@ class FallbackLadder:
             time_used=perf_counter() - started,
         )
         if selected is None:
-            return report, after
-        return self._decision(report, selected), after
-
-    def _decision(self, report: StepReport, selected: SelectedInput) -> Decision:
-        plan = selected.plan
-        made_at = report.applies_at if selected.is_new or plan is None else plan.t[0]
-        return Decision(
-            **vars(report),
+            return StepReport(**report), after
+        decision = Decision(
+            **report,
             input=selected.input,
             source=selected.source,
-            plan=plan,
-            age=round((report.applies_at - made_at) / self.dt),
+            plan=selected.plan,
+            age=self._age(selected, inputs.applies_at),
             clipped=selected.clipped,
         )
+        return decision, after
+
+    def _age(self, selected: SelectedInput, now: float) -> int:
+        """Return how many steps ago the plan of an input was made."""
+        if selected.is_new or selected.plan is None:
+            return 0
+        return round((now - selected.plan.t.item(0)) / self.dt)
 
     def _descend(
         self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, clock: StepClock

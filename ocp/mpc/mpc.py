@@ -1,10 +1,8 @@
 """Receding-horizon control (Algorithm 3): a controller around any solver."""
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import inf
-from threading import Lock, get_ident
 from time import perf_counter
 from typing import Any
 
@@ -29,6 +27,7 @@ from ocp.closed_loop.simulate import Observer, closed_loop
 from ocp.mpc.backup_selection import Backup, BackupOption, select_backup
 from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.fallback_ladder import FallbackLadder
+from ocp.mpc.one_at_a_time import OneAtATime
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.step_inputs import Parameters
 from ocp.problem.ocp import OCP
@@ -128,13 +127,12 @@ class MPC:
     # The only part that a step changes.
     state: ControllerState = field(init=False, repr=False)
     # A step takes the state that the step before it has left.
-    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
-    # The thread that is inside a step.
-    _inside: int | None = field(default=None, init=False, repr=False)
+    _alone: OneAtATime = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
         self._check()
+        self._alone = OneAtATime(f"MPC of {self.ocp.name}: step or reset is called inside a step")
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
         self._begin(None, solver_raised=False)
         self._ladder = self._built()
@@ -203,7 +201,7 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        with self._alone():
+        with self._alone:
             self._begin(first, solver_raised=self.state.solver_raised)
 
     def _begin(self, acting: np.ndarray | None, *, solver_raised: bool) -> None:
@@ -231,7 +229,7 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        with self._alone():
+        with self._alone:
             started = perf_counter()
             broken = self._rebuild() if self.state.solver_raised else ""
             report, self.state = self._ladder.step(
@@ -248,22 +246,6 @@ class MPC:
         except CALLBACK_ERRORS as error:
             return f"the solver cannot be built again: {type(error).__name__}: {error}"
         return ""
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Let one thread in at a time, and none twice.
-
-        Raises:
-            ProblemError: if a callback of a step calls the controller.
-        """
-        if self._inside == get_ident():
-            raise ProblemError(f"MPC of {self.ocp.name}: step or reset is called inside a step")
-        with self._lock:
-            self._inside = get_ident()
-            try:
-                yield
-            finally:
-                self._inside = None
 
     def run(
         self,

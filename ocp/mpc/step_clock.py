@@ -13,19 +13,22 @@ class StepClock:
         budget: what it may take [s].
         told: whether it is over, where somebody else decides that.
         late: whether it was found to be over.
-        said: after how long, in words.
     """
 
     started: float
     budget: float
     told: bool | None
     late: bool = False
-    said: str = ""
+    _used: float = 0.0
 
     def is_over(self) -> bool:
         """Look at the clock; once it is over it stays so."""
-        used = perf_counter() - self.started
         if not self.late:
-            self.late = used > self.budget if self.told is None else self.told
-            self.said = f"the answer came after {used:.3g} s, too late for its step"
+            self._used = perf_counter() - self.started
+            self.late = self._used > self.budget if self.told is None else self.told
         return self.late
+
+    @property
+    def said(self) -> str:
+        """After how long it was found to be over, in words."""
+        return f"the answer came after {self._used:.3g} s, too late for its step"

@@ -1,6 +1,5 @@
 """The solver at one control step: where it starts, what it brought, and whether that is a plan."""
 
-from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -87,7 +86,7 @@ class StepSolver:
             return self.guess
         # A plan from a wrong measurement, or one that a jump of the state has overtaken. Its node
         # before now is near enough for that, and plain numbers are quicker than numpy.
-        expected = last.x[max(0, bisect_right(last.t, t) - 1)].tolist()
+        expected = last.x[last.t.searchsorted(t, side="right") - 1].tolist()
         each = zip(expected, start.tolist(), self._sizes, strict=True)
         if all([abs(there - here) <= _FAR * (size + abs(here)) for there, here, size in each]):
             return ShiftedPlan(last, t)
