@@ -26,7 +26,7 @@ from ocp.problem.epigraph import without_kinks
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP, FreeTime
-from ocp.problem.parameters import Parameter, Signal
+from ocp.problem.parameters import Parameter, Signal, Unknown
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work
 from ocp.solution.solver import InitialGuess, Program, Solver, solve
@@ -72,6 +72,7 @@ __all__ = [
     "SolverError",
     "Status",
     "StepReport",
+    "Unknown",
     "UnsupportedProblem",
     "Work",
     "closed_loop",

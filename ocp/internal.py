@@ -23,16 +23,18 @@ from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
+from ocp.method.in_normal_form import InNormalForm
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
-from ocp.method.scaled_program import ScaledProgram, in_original_units, in_own_units
+from ocp.method.rewriting_of import rewriting_of
 from ocp.method.scaling_solver import ScalingSolver
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
+from ocp.normal_form.normal_form import normal_form
 from ocp.problem.constraint_rows import (
     ConstraintRow,
     ConstraintRows,
@@ -45,6 +47,7 @@ from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
+from ocp.problem.refusal import refuse_free_ends
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.start_feasibility import start_violation
@@ -64,6 +67,7 @@ __all__ = [
     "ConstraintRows",
     "Epigraph",
     "ImposedRows",
+    "InNormalForm",
     "Jump",
     "LQData",
     "LinearQuadratic",
@@ -76,7 +80,6 @@ __all__ = [
     "RunData",
     "RunResult",
     "ScaledOCP",
-    "ScaledProgram",
     "ScalingSolver",
     "Sizes",
     "Stage",
@@ -101,8 +104,6 @@ __all__ = [
     "elevated",
     "epigraph",
     "hamiltonian",
-    "in_original_units",
-    "in_own_units",
     "interpolate",
     "interruptible",
     "judged",
@@ -111,7 +112,10 @@ __all__ = [
     "most_violated",
     "node_fractions",
     "node_widths",
+    "normal_form",
+    "refuse_free_ends",
     "replacing",
+    "rewriting_of",
     "scaled",
     "segment_gaps",
     "sizes_of",

@@ -7,10 +7,8 @@ from ocp.internal import (
     ACCURACY,
     check_instance,
     check_positive,
-    in_original_units,
-    in_own_units,
     judged,
-    scaled,
+    rewriting_of,
 )
 from solvers.constrained.inactive_bounds import without_inactive
 from solvers.direct.multiple_shooting import MultipleShooting
@@ -63,9 +61,9 @@ def polish(
         raise UnsupportedProblem(
             f"{ocp.name}: the cost has kinks (smoothness 0), no polish applies"
         )
-    if (own := scaled(ocp)) is not None:
-        polished = polish(in_own_units(solution, own), accuracy=accuracy, solver=solver)
-        return in_original_units(polished, own)
+    if (rewriting := rewriting_of(ocp)) is not None:
+        polished = polish(rewriting.written(solution), accuracy=accuracy, solver=solver)
+        return rewriting.answer(polished)
     reduced = without_inactive(solution)
     if reduced is None:
         return _polished(solution, solver, accuracy)

@@ -18,7 +18,7 @@ _STARTS = (-2.5, -1.0, 1.8, 3.0)
 
 def value_function() -> Drawing:
     """Draw value function, reachable sets and trajectories of a one-state problem."""
-    program = _GRID.build(_problem())
+    program = _GRID.prepare(_problem())
     table = program.tabulate()
     runs = [program.run(x0=[x]).or_raise() for x in _STARTS]
     x, k = table.grid.axes[0].values, np.arange(_STEPS + 1)

@@ -65,7 +65,7 @@ def _pairs() -> tuple[_Pair, _Pair]:
 
 def _pair(plant: LinearPlant) -> _Pair:
     ocp, dt = thesis_regulator(plant, _STEPS), plant.model.dt or 0.0
-    planned, gains = solve(ocp, Batch()), Riccati().build(ocp).K
+    planned, gains = solve(ocp, Batch()), Riccati().prepare(ocp).K
     laws = (
         FeedbackLaw.following(planned),
         FeedbackLaw(law=lambda x, t: -gains[round(t / dt)] @ x),

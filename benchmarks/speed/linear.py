@@ -139,7 +139,7 @@ def _steps(mass: OCP, free: OCP) -> dict[str, Callable[[LinearCase], object]]:
 
 def feedback_law_time(steps: int, count: int = 1000) -> float:
     """Return the time of applying Riccati's first gain, u = -K x [s]: a step of DP (2.1.4)."""
-    gain, x = Riccati().build(unconstrained(steps)).K[0], np.ones(3)
+    gain, x = Riccati().prepare(unconstrained(steps)).K[0], np.ones(3)
     started = process_time()
     for _ in range(count):
         _ = -gain @ x

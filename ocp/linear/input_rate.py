@@ -56,8 +56,7 @@ def with_input_rate(
         box = ocp.control_bounds
         bounds = Constraint("control_bounds", now, box.lower, box.upper, limits_input=True)
         constraints.append(bounds)
-    free = np.full(m.nu, np.inf)
-    state = ocp.state_bounds
+    free = Box.unbounded(m.nu)
     return replace(
         ocp,
         name=f"{ocp.name}, with input rate",
@@ -65,7 +64,8 @@ def with_input_rate(
         x0=np.append(np.asarray(ocp.x0), check_numbers(previous, m.nu, f"{ocp.name}: previous")),
         running_cost=moved(ocp.running_cost) + ca.dot(ca.DM(weights), change**2),
         control_bounds=rate,
-        state_bounds=Box(np.append(state.lower, -free), np.append(state.upper, free)),
+        state_bounds=ocp.state_bounds & free,
+        start_bounds=ocp.start_bounds & free,
         constraints=tuple(constraints),
         guess=None,
     )

@@ -11,6 +11,7 @@ from ocp.linear.linear_quadratic import LinearQuadratic
 from ocp.linear.polynomial import beyond
 from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
+from ocp.problem.refusal import refuse_free_start
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +52,7 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
         )
     if not ocp.model.nu:
         raise UnsupportedProblem(f"{ocp.name}: the linear solvers need a control, there is none")
-    if ocp.has_free_start:
-        raise UnsupportedProblem(
-            f"{ocp.name}: initial constraint '{ocp.at('initial')[0].name}': "
-            "the linear solvers need a fixed start"
-        )
+    refuse_free_start(ocp, "a linear solver")
     lq = _assemble(ocp, read_terms(ocp))
     complaint = lq.sample_matrices(lq.declared).indefinite()
     if complaint:

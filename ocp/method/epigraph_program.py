@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
-from ocp.method.slack_program import SlackProgram
+from ocp.method.rewriting import RewrittenProgram
 from ocp.problem.epigraph import Epigraph
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
@@ -30,7 +30,7 @@ class EpigraphProgram(Program):
 
     solver: MethodSolver
     epigraph: Epigraph
-    smooth: SlackProgram
+    smooth: RewrittenProgram
     written: Program | None
 
     def __reduce__(self) -> tuple[Callable[..., Program], tuple[MethodSolver, OCP]]:

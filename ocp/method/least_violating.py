@@ -1,6 +1,7 @@
 """A solver's program for the trajectory that violates the hard rows of a problem least."""
 
-from ocp.method.slack_program import SlackProgram
+from ocp.method.rewriting import RewrittenProgram
+from ocp.method.with_slacks import WithSlacks
 from ocp.problem.elastic import elastic
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import Program, Solver
@@ -11,4 +12,4 @@ def least_violating(solver: Solver, ocp: OCP) -> Program | None:
     relaxed = elastic(ocp)
     if relaxed is None:
         return None
-    return SlackProgram(relaxed, solver.build(relaxed.problem))
+    return RewrittenProgram(WithSlacks(relaxed), solver.build(relaxed.problem))

@@ -6,7 +6,11 @@ from typing import Self
 
 import numpy as np
 
-from ocp.checks.arguments import check_flag
+from ocp.checks.arguments import check_flag, check_instance
+from ocp.checks.interrupts import interruptible
+from ocp.method.in_normal_form import InNormalForm
+from ocp.method.rewriting import Rewriting, RewrittenProgram
+from ocp.normal_form.normal_form import normal_form
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import Program, Solver
@@ -34,9 +38,27 @@ class MethodSolver(Solver):
         check_flag(self.judged, f"{type(self).__name__}: judged")
         check_flag(self.takes_knots, f"{type(self).__name__}: takes_knots")
 
-    @abstractmethod
+    @interruptible
     def build(self, ocp: OCP) -> Program:
-        """Do all symbolic work for a problem."""
+        """Do all symbolic work for a problem, after it is brought into its normal form.
+
+        Raises:
+            UnsupportedProblem: naming the term that this method cannot treat.
+        """
+        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+        form = normal_form(ocp)
+        if form is None:
+            return self.build_normal(ocp)
+        program = self.unjudged().build_normal(form.problem)
+        return self.judging(InNormalForm(form), program)
+
+    def build_normal(self, ocp: OCP) -> Program:
+        """Build it for a problem in normal form; here in the units it is written in."""
+        return self.prepare(ocp)
+
+    @abstractmethod
+    def prepare(self, ocp: OCP) -> Program:
+        """Do all symbolic work for a problem in normal form, in the units it is written in."""
 
     @property
     def success_accuracy(self) -> float:
@@ -53,6 +75,11 @@ class MethodSolver(Solver):
         if not self.takes_knots:
             return np.linspace(0.0, 1.0, intervals + 1)
         return node_fractions(ocp, intervals)
+
+    def judging(self, rewriting: Rewriting, program: Program) -> RewrittenProgram:
+        """Return a program around one of a rewritten problem, which itself judges nothing."""
+        accuracy = self.success_accuracy if self.judged else np.inf
+        return RewrittenProgram(rewriting, program, accuracy, self.end_slack)
 
     def unjudged(self) -> Self:
         """Return the solver without the comparison."""

@@ -1,14 +1,13 @@
 """What is done to a problem before a method gets it: kinks replaced, everything in sizes."""
 
-from abc import abstractmethod
 from dataclasses import dataclass
 
-from ocp.checks.arguments import check_instance
-from ocp.checks.interrupts import interruptible
 from ocp.method.epigraph_program import EpigraphProgram
+from ocp.method.in_sizes import InSizes
+from ocp.method.method_program import MethodProgram
 from ocp.method.method_solver import MethodSolver
-from ocp.method.scaled_program import ScaledProgram
-from ocp.method.slack_program import SlackProgram
+from ocp.method.rewriting import RewrittenProgram
+from ocp.method.with_slacks import WithSlacks
 from ocp.problem.epigraph import Epigraph
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import scaled
@@ -22,20 +21,15 @@ class ScalingSolver(MethodSolver):
     Every tolerance and residual is relative to those sizes, see ``Solution.sizes``.
     """
 
-    @interruptible
-    def build(self, ocp: OCP) -> Program:
-        """Do all symbolic work; kinks in the cost are replaced first, where that is exact.
-
-        Raises:
-            UnsupportedProblem: naming the term that this method cannot treat.
-        """
-        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+    def build_normal(self, ocp: OCP) -> Program:
+        """Do all symbolic work; kinks in the cost are replaced first, where that is exact."""
         smooth = self.smooth_form(ocp)
         if smooth is None:
             return self._build_in_sizes(ocp)
         written = self._build_in_sizes(ocp) if smooth.depends_on_data else None
         program = self.unjudged()._build_in_sizes(smooth.problem)
-        return EpigraphProgram(self, smooth, SlackProgram(smooth, program), written)
+        smoothed = RewrittenProgram(WithSlacks(smooth), program)
+        return EpigraphProgram(self, smooth, smoothed, written)
 
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Return the problem with slack controls where this method treats them exactly, or None.
@@ -49,8 +43,7 @@ class ScalingSolver(MethodSolver):
         in_sizes = scaled(ocp)
         if in_sizes is None:
             return self.prepare(ocp)
-        return ScaledProgram(in_sizes, self.unjudged().prepare(in_sizes), self)
-
-    @abstractmethod
-    def prepare(self, ocp: OCP) -> Program:
-        """Do all symbolic work for a problem in the units it is written in."""
+        program = self.unjudged().prepare(in_sizes)
+        if not isinstance(program, MethodProgram):  # it runs others, and judges by itself
+            return RewrittenProgram(InSizes(in_sizes), program)
+        return self.judging(InSizes(in_sizes), program)

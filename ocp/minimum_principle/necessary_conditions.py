@@ -36,9 +36,9 @@ class MinimumPrinciple:
         hamiltonian: H and its derivatives.
         control: (x, costate, t, p) -> the minimising control (nu,), within its bounds.
         flow: (z, t, p) -> dz/dt for z = (x, costate), with the minimising control.
-        start: (x, costate, mu, t, p) -> what must vanish at t0 where the start is free:
-            the initial constraints c, and costate + c_x' mu (the costate is then normal
-            to the manifold, thesis 3.45).
+        start: (x, costate, mu, t, p, x0) -> what must vanish at t0 where the start is free:
+            c, of the initial constraints and of what is given of the start, x - x0; and
+            costate + c_x' mu (the costate is then normal to the manifold, thesis 3.45).
         end: (x, costate, nu, t, p) -> what must vanish at the final time:
             costate - phi_x - psi_x' nu; the terminal constraints psi; and where the final
             time is free H + phi_t + nu' psi_t.
@@ -146,11 +146,13 @@ def _flow(ocp: OCP, control: ca.Function, h: Hamiltonian) -> ca.Function:
 def _start(ocp: OCP) -> ca.Function:
     m = ocp.model
     costate = ca.SX.sym("costate", m.nx)
-    c = _equations(ocp, ocp.at("initial"))
+    x0 = ca.SX.sym("x0", m.nx)
+    given = np.flatnonzero(~ocp.start_is_free).tolist() if ocp.has_free_start else []
+    c = ca.vertcat(_equations(ocp, ocp.at("initial")), (m.x - x0)[given, :])
     mu = ca.SX.sym("mu", c.numel())
     normal = costate + ca.mtimes(ca.jacobian(c, m.x).T, mu)
-    names = ["x", "costate", "mu", "t", "p"]
-    inputs = [m.x, costate, mu, m.t, ocp.p]
+    names = ["x", "costate", "mu", "t", "p", "x0"]
+    inputs = [m.x, costate, mu, m.t, ocp.p, x0]
     return ca.Function("start", inputs, [ca.vertcat(c, normal)], names, ["residual"])
 
 

@@ -175,6 +175,7 @@ class MPC:
             raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
         if self.ocp.has_free_start:
             raise UnsupportedProblem(f"MPC of {name}: its start is free, here it is measured")
+        self._check_terms()
         check_positive(dt, f"MPC of {name}: dt [s]")
         if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
             raise ProblemError(f"MPC of {name}: dt = {dt} s, but the model's step is {model.dt} s")
@@ -186,6 +187,24 @@ class MPC:
             check_positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
         check_not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
         check_flag(self.least_violating, f"MPC of {name}: least_violating")
+
+    def _check_terms(self) -> None:
+        """Refuse what has no meaning over a horizon that moves with time."""
+        name = self.ocp.name
+        if self.ocp.unknowns:
+            raise UnsupportedProblem(
+                f"MPC of {name}: '{self.ocp.unknowns[0].name}' is an unknown constant, which every "
+                "step would choose anew: solve for it once, and make it a Parameter of that value"
+            )
+        if integrals := self.ocp.at("integral"):
+            raise UnsupportedProblem(
+                f"MPC of {name}: the integral constraint '{integrals[0].name}' would begin anew at "
+                "every step: carry the integral as a state, bounded at the end"
+            )
+        if self.ocp.refers_to_start:
+            raise UnsupportedProblem(
+                f"MPC of {name}: a term contains the state at the start, which every step moves"
+            )
 
     @property
     def is_stateful(self) -> bool:

@@ -206,8 +206,7 @@ class Transcription:
         result = {}
         for key, side in (("lbx", "lower"), ("ubx", "upper")):
             z = np.tile(np.asarray(getattr(state, side)), (self.n + 1, 1))
-            if not ocp.has_free_start:
-                z[0] = data.x0
+            z[0] = ocp.start_of(data.x0, np.asarray(getattr(ocp.start_box, side)))
             if ocp.has_free_time:
                 bound = np.asarray(getattr(time, side))[0] / self.time_unit
                 z = np.hstack([z, np.full((self.n + 1, 1), bound)])

@@ -13,7 +13,7 @@ from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_column
 from ocp.problem.portable import Portable
 
-Place = Literal["path", "initial", "terminal"]
+Place = Literal["path", "initial", "terminal", "integral"]
 PLACES: tuple[Place, ...] = get_args(Place)
 _RELATIONS = (ca.OP_LE, ca.OP_LT, ca.OP_EQ, ca.OP_NE)
 
@@ -46,6 +46,15 @@ class Box(Portable):
             raise ProblemError(f"{what}[{i}]: no number lies between {lower[i]} and {upper[i]}")
         return Box(lower, upper)
 
+    def __and__(self, other: "Box") -> "Box":
+        """Return the box of both vectors, one behind the other; both are sized."""
+        return Box(np.append(self.lower, other.lower), np.append(self.upper, other.upper))
+
+    @classmethod
+    def unbounded(cls, size: int) -> "Box":
+        """Return a box (size,) that bounds nothing."""
+        return cls(np.full(size, -np.inf), np.full(size, np.inf))
+
     @cached_property
     def is_active(self) -> bool:
         """Whether any component is bounded at all."""
@@ -77,11 +86,12 @@ class Constraint(Portable):
 
     Args:
         name: what a message calls it.
-        expression: column (m,) in x, u, t and parameters; no u unless ``at="path"``.
+        expression: column (m,) in x, u, t and parameters; no u at ``"initial"`` and ``"terminal"``.
         lower: number or (m,); equal to ``upper`` for an equation.
         upper: number or (m,).
         at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
-            manifold, and ``x0`` a guess) or ``"terminal"``.
+            manifold, and ``x0`` a guess), ``"terminal"``, or ``"integral"``: the integral of the
+            expression over the horizon lies between the bounds.
         nominal: a typical size of the rows, a number or (m,), to measure a violation by; None: it
             is estimated, see ``Solution.sizes``.
         limits_input: whether the rows limit what an actuator is sent, so that whatever acts has to

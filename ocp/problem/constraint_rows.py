@@ -130,14 +130,20 @@ class ConstraintRows:
 
     @classmethod
     def of_bounds(
-        cls, box: Box, symbols: ca.SX, names: tuple[str, ...], *, kind: RowKind
+        cls,
+        box: Box,
+        symbols: ca.SX,
+        names: tuple[str, ...],
+        *,
+        kind: RowKind,
+        place: Place = "path",
     ) -> "ConstraintRows":
         """Return the bounds of states, or of controls, as rows."""
         lower, upper = np.asarray(box.lower), np.asarray(box.upper)
         rows = tuple(
             ConstraintRow(
                 name=f"bound of {name}",
-                place="path",
+                place=place,
                 node=0,
                 lower=float(low),
                 upper=float(high),
@@ -231,8 +237,10 @@ class ProblemRows:
         states: bounds of the states; at every instant.
         controls: bounds of the controls; wherever one acts.
         path: path constraints; those with a control wherever one acts, the others everywhere.
+        start: bounds of what is free of the start; at the start.
         initial: at the start.
         terminal: at the end.
+        integral: of the integrals over the horizon.
         invariants: what the exact dynamics keep; no method imposes them.
         time: the bounds of the duration [s].
     """
@@ -240,8 +248,10 @@ class ProblemRows:
     states: ConstraintRows
     controls: ConstraintRows
     path: ConstraintRows
+    start: ConstraintRows
     initial: ConstraintRows
     terminal: ConstraintRows
+    integral: ConstraintRows
     invariants: ConstraintRows
     time: ConstraintRow
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.model import Model
-from ocp.problem.parameters import Parameter, Signal
+from ocp.problem.parameters import Parameter, Signal, Unknown
 
 
 class _Problem(Protocol):
@@ -38,7 +38,10 @@ class _Problem(Protocol):
     def has_free_time(self) -> bool: ...
 
     @property
-    def has_free_start(self) -> bool: ...
+    def start_is_free(self) -> np.ndarray: ...
+
+    @property
+    def start_bounds(self) -> Box: ...
 
     @property
     def running_cost(self) -> ca.SX | float: ...
@@ -57,6 +60,9 @@ class _Problem(Protocol):
 
     @property
     def invariants(self) -> tuple[Constraint, ...]: ...
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
     def parameters(self) -> tuple[Parameter | Signal, ...]: ...
@@ -84,16 +90,38 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     if ocp.has_free_time:
         box = ocp.time_box
         yield f"    {_between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"
-    yield f"    x(0) = {_vector(ocp.x0)}" + ("   (guess)" if ocp.has_free_start else "")
+    yield f"    x(0) = {_vector(ocp.x0)}" + _freedom(ocp.start_is_free, m.x_names)
+    yield from _bounds(ocp.start_bounds, tuple(f"{n}(0)" for n in m.x_names), m.x_units)
     yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
     yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
     for c in ocp.constraints:
         yield from _constraint(c, c.at)
     for c in ocp.invariants:
         yield from _constraint(c, "kept by the dynamics")
+    for entry in ocp.unknowns:
+        yield f"    {entry.name} ({', '.join(element_names(entry.symbol))}): {_unknown(entry)}"
     for entry in ocp.parameters:
         symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
         yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
+
+
+def _unknown(entry: Unknown) -> str:
+    """Say what is known of an unknown constant: its bounds and the guess."""
+    each = zip(
+        element_names(entry.symbol), np.asarray(entry.lower), np.asarray(entry.upper), strict=True
+    )
+    bounds = [
+        _between(low, name, high) for name, low, high in each if np.isfinite([low, high]).any()
+    ]
+    return ", ".join(["unknown constant", *bounds, f"guess {_vector(entry.value)}"])
+
+
+def _freedom(free: np.ndarray, names: tuple[str, ...]) -> str:
+    """Say which states start where the optimiser chooses."""
+    if not free.any():
+        return ""
+    chosen = [name for name, is_free in zip(names, free, strict=True) if is_free]
+    return "   (guess)" if free.all() else f"   ({', '.join(chosen)}: guess)"
 
 
 def _count(number: int, what: str) -> str:

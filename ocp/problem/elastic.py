@@ -66,7 +66,6 @@ class Elastic(Portable):
             if expression.numel():
                 own = unused(name, names)
                 kept.append(Constraint(own, expression, low, high, limits_input=limits_input))
-        box = ocp.control_bounds
         return replace(
             ocp,
             name=f"{ocp.name}, least violation",
@@ -78,7 +77,7 @@ class Elastic(Portable):
             ),
             running_cost=ca.SX(ocp.running_cost) + weight * (s + s**2 / 2),
             terminal_cost=ca.SX(ocp.terminal_cost) + weight * self._horizon * self._at_end,
-            control_bounds=Box(np.append(box.lower, 0.0), np.append(box.upper, np.inf)),
+            control_bounds=ocp.control_bounds & Box([0.0], [np.inf]),
             state_bounds=Box(),
             constraints=tuple(kept),
             smoothness=min(ocp.smoothness, 1),

@@ -97,7 +97,6 @@ class Epigraph:
     def problem(self) -> OCP:
         """The problem whose last controls are the slacks."""
         ocp, m, s = self.original, self.original.model, self.rewritten.s
-        many, box = np.full(s.numel(), np.inf), ocp.control_bounds
         names = {c.name for c in (*ocp.constraints, *ocp.invariants)}
         above = tuple(
             Constraint(unused(f"slack {i}", names), expression, 0.0)
@@ -111,7 +110,7 @@ class Epigraph:
             ocp,
             model=replace(m, u=ca.vertcat(m.u, s), u_units=units, u_nominal=nominal),
             running_cost=self.rewritten.cost,
-            control_bounds=Box(np.append(box.lower, -many), np.append(box.upper, many)),
+            control_bounds=ocp.control_bounds & Box.unbounded(s.numel()),
             constraints=(*ocp.constraints, *above),
             smoothness=ocp.smoothness if self.rewritten.left else 2,
             guess=None if ocp.guess is None else self._extended(ocp.guess),

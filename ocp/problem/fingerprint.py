@@ -38,6 +38,8 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
         "initial constraints": functions.initial,
         "terminal constraints": functions.terminal,
     }
+    if ocp.at("integral"):
+        along["integral constraints"] = functions.integrands
     values = {name: [f(*point) for point in points] for name, f in along.items()}
     values |= {name: [f(x, t, p) for x, _, t, p in points] for name, f in at_ends.items()}
     parts = {
@@ -48,9 +50,14 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
         "state bounds": _stacked(ocp.state_bounds),
         "horizon": np.concatenate([_stacked(ocp.time_box), [ocp.model.dt or 0.0]]),
     }
+    if ocp.free_start or ocp.start_bounds.is_active:
+        parts["free start"] = np.concatenate([ocp.start_is_free, _stacked(ocp.start_bounds)])
     for at in PLACES:
         bounds = [_stacked(c) for c in ocp.at(at)]
-        parts[f"{at} constraints"] = np.concatenate([parts[f"{at} constraints"], *bounds])
+        if (name := f"{at} constraints") in parts:
+            parts[name] = np.concatenate([parts[name], *bounds])
+    if ocp.unknowns:
+        parts["unknown constants"] = np.concatenate([_stacked(e.box) for e in ocp.unknowns])
     return parts
 
 

@@ -26,6 +26,7 @@ class Functions:
         initial: initial constraints c, stacked.
         initial_slope: c_x (m, nx).
         terminal: terminal constraints psi, stacked.
+        integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
     """
 
@@ -38,6 +39,7 @@ class Functions:
     initial: ca.Function
     initial_slope: ca.Function
     terminal: ca.Function
+    integrands: ca.Function
     invariants: ca.Function
 
     @classmethod
@@ -75,6 +77,7 @@ class Functions:
             initial=at_an_end("initial", c),
             initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
             terminal=at_an_end("terminal", psi),
+            integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
         )
 

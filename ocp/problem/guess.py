@@ -1,11 +1,12 @@
 """Where a solver starts: any part of a trajectory, from anywhere."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_numeric, check_positive
+from ocp.checks.arguments import check_instance, check_numeric, check_positive
 from ocp.checks.errors import ProblemError
 
 
@@ -21,15 +22,18 @@ class Guess:
         u: controls.
         costate: costates dJ*/dx; one row is the plain psi(t0) of the thesis (3.50).
         duration: final time minus t0 [s], where it is free.
+        unknowns: values of unknown constants, by name.
     """
 
     x: ArrayLike | None = None
     u: ArrayLike | None = None
     costate: ArrayLike | None = None
     duration: float | None = None
+    unknowns: Mapping[str, ArrayLike] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the duration; the shapes are checked where they are known."""
+        check_instance(self.unknowns, Mapping, "guess: unknowns (values by name)")
         if self.duration is not None:
             check_positive(self.duration, "guess: duration")
 

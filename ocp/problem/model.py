@@ -38,6 +38,9 @@ class Model(Portable):
         x_nominal: a typical size of each state, a number or (nx,), for solvers to measure it by;
             None: they estimate it, see ``Solution.sizes``.
         u_nominal: the same of the controls (nu,).
+        start: symbols of the state at the start (nx,), for costs and constraints that couple both
+            ends of a trajectory, such as ``x - model.start`` at the end of a period; they are made
+            by the model.
         u_is_change: whether the controls are changes of what an actuator holds, see
             ``with_input_rate``: to hold is then to send zero.
 
@@ -56,6 +59,7 @@ class Model(Portable):
     x_nominal: ArrayLike | None = None
     u_nominal: ArrayLike | None = None
     u_is_change: bool = False
+    start: ca.SX = field(default_factory=ca.SX)
 
     def __post_init__(self) -> None:
         """Check every shape and symbol."""
@@ -72,6 +76,9 @@ class Model(Portable):
                 f"model '{self.name}': f has {f.numel()} rows, but there are {self.nx} states x"
             )
         object.__setattr__(self, "f", f)
+        if self.start.numel() != self.nx:  # none yet, or those of a model with other states
+            named = [ca.SX.sym(f"{name}(t0)") for name in self.x_names]
+            object.__setattr__(self, "start", ca.vertcat(ca.SX(0, 1), *named))
         if self.dt is not None:
             check_positive(self.dt, f"model '{self.name}': dt")
         for label, units, size in (("x", self.x_units, self.nx), ("u", self.u_units, self.nu)):

@@ -21,6 +21,7 @@ def node_fractions(ocp: OCP, intervals: int) -> np.ndarray:
     They are equally spaced where the knots of all declared signals are among such nodes. Else
     the intervals are shared out among the spaces between the knots, in proportion to their
     lengths and at least one each, since the integration of an interval sees no jump inside it.
+    Twice as many are then the same ones halved, unless as many equal ones hit the knots.
     Where there are more knots than intervals, those at which the declared samples bend are
     taken in, then those at which they jump, then none. In discrete time the steps are the nodes.
 

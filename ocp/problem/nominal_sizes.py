@@ -24,11 +24,15 @@ from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
 
-# How much each kind of knowledge counts: bounds, start and guess, dynamics, the rate at the start
-# (which fast dynamics keep up for much less than T), cost, rows.
+# How much each kind of knowledge counts: what is declared, bounds, start and guess, dynamics, the
+# rate at the start (which fast dynamics keep up for much less than T), cost, rows.
+_DECLARED = 100.0
 _BOUND, _GIVEN, _DYNAMICS, _RATE, _COST, _ROW = 2.0, 1.0, 1.0, 0.2, 0.3, 0.5
 # What is left of terms that cancel, relative to them, is rounding.
 _ROUNDING = 1e-9
+# What changes by more than this part of itself with a tick of the clock, a part of the horizon, is
+# decided by rounding.
+_UNSTEADY, _TICK = 0.5, 1e-12
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
@@ -139,24 +143,41 @@ class _Functions:
         outputs = []
         for cost in (ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)):
             outputs += [cost, ca.gradient(cost, w), ca.gradient(cost, p)]
-        constraints = {
-            c.name: (c, ca.Function("c", given, [c.expression, ca.jacobian(c.expression, w)]))
-            for c in ocp.constraints
-        }
+        horizon = float(ocp.steps or ocp.duration)
+
+        def row(c: Constraint) -> ca.Function:
+            value = horizon * c.expression if c.at == "integral" else c.expression
+            return ca.Function("c", given, [value, ca.jacobian(value, w)])
+
+        constraints = {c.name: (c, row(c)) for c in ocp.constraints}
         return cls(
             nx=m.nx,
-            horizon=float(ocp.steps or ocp.duration),
+            horizon=horizon,
             dynamics=ca.Function("f", given, [rate, ca.jacobian(rate, w)]),
             costs=ca.Function("costs", given, [ca.densify(o) for o in outputs]),
             constraints=constraints,
         )
 
+    def _values(self, function: ca.Function, point: _Point) -> list[np.ndarray]:
+        """Return the outputs at a point, 0 where rounding of the clock decides them.
+
+        A sine that is zero at an instant but for rounding says nothing of sizes there.
+        """
+        later = point._replace(t=point.t + _TICK * self.horizon)
+        each = zip(function(*point), function(*later), strict=True)
+        both = ((np.array(here), np.array(there)) for here, there in each)
+        return [
+            np.where(np.abs(there - here) > _UNSTEADY * np.abs(here), 0.0, here)
+            for here, there in both
+        ]
+
     def equations(self, point: _Point) -> Iterator[_Equation]:
         """Yield what dynamics and constraints at a point say of the sizes."""
         yield from self._of_dynamics(point)
         for c, function in self.constraints.values():
-            value, jacobian = (np.array(v) for v in function(*point))
-            offset = _offset(c, value.ravel())
+            value, jacobian = self._values(function, point)
+            terms = np.abs(jacobian) @ np.abs(np.concatenate([point.x, point.u]))
+            offset = _offset(c, value.ravel(), terms)
             for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
                 if offset[i] > 0.0:
                     size = float(np.log(offset[i]) - np.log(abs(jacobian[i, j])))
@@ -164,14 +185,14 @@ class _Functions:
 
     def rate_sizes(self, point: _Point) -> Iterator[_Equation]:
         """Yield what the rate at a point says of the sizes by itself."""
-        rate, jacobian = (np.array(v) for v in self.dynamics(*point))
+        rate, jacobian = self._values(self.dynamics, point)
         rate = self.horizon * rate.ravel()
         terms = self.horizon * np.abs(jacobian) @ np.abs(np.concatenate([point.x, point.u]))
         for i in np.flatnonzero(_usable(rate) & (np.abs(rate) > _ROUNDING * terms)).tolist():
             yield _Equation(_RATE, (i,), (), float(np.log(abs(rate[i]))))
 
     def _of_dynamics(self, point: _Point) -> Iterator[_Equation]:
-        jacobian = self.horizon * np.array(self.dynamics(*point)[1])
+        jacobian = self.horizon * self._values(self.dynamics, point)[1]
         for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
             if i != j:
                 gain = float(np.log(abs(jacobian[i, j])))
@@ -190,7 +211,7 @@ class _Functions:
 
     def of_costs(self, point: _Point) -> Iterator[_Equation]:
         """Yield what values and slopes of the cost at a point say of the sizes."""
-        values = [np.array(v).ravel() for v in self.costs(*point)]
+        values = [v.ravel() for v in self._values(self.costs, point)]
         cost = len(values[1])  # its place among the sizes
         for share, (value, slope, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
             own = share * np.concatenate([value, by_p * point.p])
@@ -254,8 +275,11 @@ def _displaced(ocp: OCP, points: list[_Point], sizes: np.ndarray) -> list[_Point
 
 
 def _given(ocp: OCP) -> Iterator[_Equation]:
-    """Yield what start, guess and bounds say of the sizes by themselves."""
+    """Yield what the user, start, guess and bounds say of the sizes by themselves."""
     m = ocp.model
+    for declared, first in ((m.x_nominal, 0), (m.u_nominal, m.nx)):
+        for j, size in enumerate([] if declared is None else np.ravel(declared)):
+            yield _Equation(_DECLARED, (first + j,), (), float(np.log(size)))
     rows = [(_GIVEN, 0, ocp.start()[None, :])]
     if ocp.guess is not None:
         for part, first, width in (("x", 0, m.nx), ("u", m.nx, m.nu)):
@@ -278,11 +302,17 @@ def _distance(c: Constraint, value: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(nearest), nearest, 0.0)
 
 
-def _offset(c: Constraint, value: np.ndarray) -> np.ndarray:
-    """Return how far the rows of a constraint are from their bounds; 0 where that says nothing."""
+def _offset(c: Constraint, value: np.ndarray, terms: np.ndarray) -> np.ndarray:
+    """Return how far the rows of a constraint are from their bounds; 0 where that says nothing.
+
+    Args:
+        c: the constraint.
+        value: of its rows.
+        terms: magnitude of what they are sums of: what is left of terms that cancel is rounding.
+    """
     sides = np.vstack([np.asarray(c.lower, float), np.asarray(c.upper, float)]) - value
     distance = np.where(np.isfinite(sides), np.abs(sides), 0.0)
-    distance[distance <= _ROUNDING * np.abs(value)] = 0.0
+    distance[distance <= _ROUNDING * np.maximum(np.abs(value), terms)] = 0.0
     largest = distance.max(axis=0)
     return np.where(_usable(largest), largest, 0.0)
 

@@ -19,7 +19,14 @@ from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
-from ocp.problem.parameters import Parameter, ParameterValues, Signal
+from ocp.problem.parameters import (
+    Entry,
+    Parameter,
+    ParameterValues,
+    Signal,
+    StartValue,
+    Unknown,
+)
 from ocp.problem.portable import Portable
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
@@ -67,17 +74,21 @@ class OCP(Portable):
     Args:
         name: what people call it.
         model: the dynamics.
-        x0: start (nx,); with an ``"initial"`` constraint only a guess of it.
+        x0: start (nx,); of what is free of it only a guess.
         horizon: duration [s], ``FreeTime``, or a number of steps for a discrete-time model.
         running_cost: L(x, u, t, parameters).
         terminal_cost: phi(x, t, parameters).
         control_bounds: box around the controls.
         state_bounds: box around the states.
         constraints: path, initial and terminal constraints.
+        free_start: names of the states whose start the optimiser chooses, the others start at
+            ``x0``; empty: none, or with an ``"initial"`` constraint all.
+        start_bounds: box around the free part of the start, at the start alone.
         invariants: what the exact dynamics keep by themselves (the task error of a redundant
             arm, an energy, the norm of a quaternion). No method has to impose them; the
             referee reports how far a solution strays.
         parameters: constants and sampled signals that may change from run to run.
+        unknowns: constants that the optimiser chooses.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -94,8 +105,11 @@ class OCP(Portable):
     control_bounds: Box = field(default_factory=Box)
     state_bounds: Box = field(default_factory=Box)
     constraints: tuple[Constraint, ...] = ()
+    free_start: tuple[str, ...] = ()
+    start_bounds: Box = field(default_factory=Box)
     invariants: tuple[Constraint, ...] = ()
     parameters: tuple[Parameter | Signal, ...] = ()
+    unknowns: tuple[Unknown, ...] = ()
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -113,8 +127,10 @@ class OCP(Portable):
             self.control_bounds.sized(model.nu, f"{self.name}: control_bounds"),
         )
         set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
+        set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
         self._check_names()
         self._check_horizon()
+        self._check_free_start()
         self._check_symbols()
         self._check_start()
 
@@ -122,8 +138,25 @@ class OCP(Portable):
 
     @property
     def p(self) -> ca.SX:
-        """All parameter and signal symbols, stacked (n_p,)."""
-        return ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.parameters])
+        """Symbols of all that a run gives, or the optimiser chooses once, stacked (n_p,)."""
+        return ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.entries])
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """What stands in p: parameters and signals, unknown constants, the state at the start."""
+        start = (StartValue(self.model.start, self.start()),) if self.refers_to_start else ()
+        return (*self.parameters, *self.unknowns, *start)
+
+    @cached_property
+    def refers_to_start(self) -> bool:
+        """Whether a term contains the state at the start."""
+        start = {e.element_hash() for e in ca.vertsplit(self.model.start)}
+        written = [
+            *(e for e in (self.running_cost, self.terminal_cost) if isinstance(e, ca.SX)),
+            *(c.expression for c in (*self.constraints, *self.invariants)),
+            self.model.f,
+        ]
+        return any(s.element_hash() in start for s in ca.symvar(ca.veccat(*written)))
 
     @property
     def has_free_time(self) -> bool:
@@ -131,9 +164,30 @@ class OCP(Portable):
         return isinstance(self.horizon, FreeTime)
 
     @property
+    def start_is_free(self) -> np.ndarray:
+        """Which states start where the optimiser chooses, bool (nx,)."""
+        if self.free_start:
+            return np.array([name in self.free_start for name in self.model.x_names], dtype=bool)
+        on_manifold = any(c.at == "initial" for c in self.constraints)
+        return np.full(self.model.nx, on_manifold)
+
+    @property
     def has_free_start(self) -> bool:
-        """Whether the start is only required to lie on a manifold."""
-        return any(c.at == "initial" for c in self.constraints)
+        """Whether any part of the start is an unknown."""
+        return bool(self.start_is_free.any())
+
+    @property
+    def start_box(self) -> Box:
+        """Bounds of x(t0): those of the states and of the start; none where the start is given."""
+        free, states, own = self.start_is_free, self.state_bounds, self.start_bounds
+        return Box(
+            np.where(free, np.maximum(states.lower, own.lower), -np.inf),
+            np.where(free, np.minimum(states.upper, own.upper), np.inf),
+        )
+
+    def start_of(self, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return a start (nx,): what is given of it from ``x0``, what is free from ``x``."""
+        return np.where(self.start_is_free, x, x0)
 
     @property
     def duration(self) -> float:
@@ -182,14 +236,41 @@ class OCP(Portable):
             states=ConstraintRows.of_bounds(self.state_bounds, m.x, m.x_names, kind="hard"),
             controls=ConstraintRows.of_bounds(self.control_bounds, m.u, m.u_names, kind="input"),
             path=ConstraintRows.of(self.at("path"), "path", m),
+            start=ConstraintRows.of_bounds(
+                self.start_box, m.x, m.x_names, kind="hard", place="initial"
+            ),
             initial=ConstraintRows.of(self.at("initial"), "initial", m),
             terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
+            integral=ConstraintRows.of(self.at("integral"), "integral", m),
             invariants=ConstraintRows.of(self.invariants, "path", m),
             time=ConstraintRow("final time", "time", 0, lower, upper),
         )
 
     def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
         """Return the numbers of a run: the declared ones, replaced by those ``given``."""
+        for entry in self.unknowns:
+            if given and entry.name in given:
+                raise ProblemError(
+                    f"{self.name}: '{entry.name}' is an unknown constant, which the optimiser "
+                    "chooses; a value to start from is a guess: Guess(unknowns={...})"
+                )
+        return self._values(given) if given else self._declared
+
+    def values_of(
+        self,
+        parameters: Mapping[str, ArrayLike],
+        unknowns: Mapping[str, ArrayLike],
+        start: np.ndarray,
+    ) -> ParameterValues:
+        """Return the numbers of a solution: also of what the optimiser has chosen.
+
+        Args:
+            parameters: values of parameters and samples of signals, by name.
+            unknowns: values of unknown constants, by name.
+            start: state at the start (nx,).
+        """
+        begun = {e.name: start for e in self.entries if isinstance(e, StartValue)}
+        given = {**parameters, **unknowns, **begun}
         return self._values(given) if given else self._declared
 
     @cached_property
@@ -197,7 +278,7 @@ class OCP(Portable):
         return self._values({})
 
     def _values(self, given: Mapping[str, ArrayLike]) -> ParameterValues:
-        values = ParameterValues.of(self.parameters, given)
+        values = ParameterValues.of(self.entries, given)
         for entry, value in zip(values.entries, values.values, strict=True):
             if isinstance(entry, Signal) and self.steps and len(value) != self.steps + 1:
                 raise ProblemError(
@@ -227,7 +308,19 @@ class OCP(Portable):
                 f"{self.name}: the guess is {guess if isinstance(guess, type) else type(guess)}, "
                 "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
             )
+        if isinstance(guess, Guess):
+            self._check_guessed_unknowns(guess)
         return guess
+
+    def _check_guessed_unknowns(self, guess: Guess) -> None:
+        entries = {entry.name: entry for entry in self.unknowns}
+        for name, value in guess.unknowns.items():
+            if name not in entries:
+                known = ", ".join(entries) or "none"
+                raise ProblemError(
+                    f"{self.name}: guess: '{name}' is no unknown constant; declared are: {known}"
+                )
+            entries[name].checked(value)
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
@@ -245,22 +338,28 @@ class OCP(Portable):
         check_instance(self.model, Model, f"{self.name}: model")
         check_instance(self.control_bounds, Box, f"{self.name}: control_bounds")
         check_instance(self.state_bounds, Box, f"{self.name}: state_bounds")
+        check_instance(self.start_bounds, Box, f"{self.name}: start_bounds")
         self.first_guess()
         for what, kind in (
             ("constraints", Constraint),
             ("invariants", Constraint),
             ("parameters", (Parameter, Signal)),
+            ("unknowns", Unknown),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")
             for entry in entries:
                 check_instance(entry, kind, f"{self.name}: an entry of {what}")
             object.__setattr__(self, what, tuple(entries))
+        check_instance(self.free_start, (tuple, list), f"{self.name}: free_start")
+        for name in self.free_start:
+            check_instance(name, str, f"{self.name}: an entry of free_start")
+        object.__setattr__(self, "free_start", tuple(self.free_start))
 
     def _check_names(self) -> None:
         for kind, entries in (
             ("constraint", (*self.constraints, *self.invariants)),
-            ("parameter", self.parameters),
+            ("parameter", (*self.parameters, *self.unknowns)),
         ):
             names = [entry.name for entry in entries]
             twice = sorted({n for n in names if names.count(n) > 1})
@@ -281,6 +380,21 @@ class OCP(Portable):
                 "a number of steps, a whole one, and no duration"
             )
 
+    def _check_free_start(self) -> None:
+        names = self.model.x_names
+        for name in self.free_start:
+            if name not in names:
+                raise ProblemError(
+                    f"{self.name}: free_start: '{name}' is no state; they are {', '.join(names)}"
+                )
+        bounded = np.isfinite(self.start_bounds.lower) | np.isfinite(self.start_bounds.upper)
+        for i in np.flatnonzero(bounded & ~self.start_is_free):
+            raise ProblemError(
+                f"{self.name}: start_bounds[{i}]: the start of {names[i]} is given; name it in "
+                "free_start"
+            )
+        self.start_box.sized(self.model.nx, f"{self.name}: bounds of the start")
+
     def _check_symbols(self) -> None:
         model, p = self.model, self.p
         declared = element_names(ca.vertcat(model.x, model.u, model.t, p))
@@ -294,14 +408,34 @@ class OCP(Portable):
         refuse_foreign_symbols(ca.SX(self.running_cost), everywhere, f"{self.name}: running_cost")
         refuse_foreign_symbols(ca.SX(self.terminal_cost), at_ends, f"{self.name}: terminal_cost")
         for c in self.constraints:
-            allowed = everywhere if c.at == "path" else at_ends
+            allowed = everywhere if c.at in ("path", "integral") else at_ends
             refuse_foreign_symbols(
                 c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'"
             )
+        self._check_used()
         for c in self.invariants:
             refuse_foreign_symbols(c.expression, at_ends, f"{self.name}: invariant '{c.name}'")
             if c.at != "path":
                 raise ProblemError(f"{self.name}: invariant '{c.name}' must hold at='path'")
+
+    def _check_used(self) -> None:
+        """Refuse an unknown constant that nothing depends on, and integrals of steps."""
+        terms = [self.model.f, ca.SX(self.running_cost), ca.SX(self.terminal_cost)]
+        used = ca.symvar(ca.veccat(*terms, *[c.expression for c in self.constraints]))
+        hashes = {symbol.element_hash() for symbol in used}
+        for entry in self.unknowns:
+            for symbol in ca.vertsplit(entry.symbol):
+                if symbol.element_hash() not in hashes:
+                    raise ProblemError(
+                        f"{self.name}: unknown constant '{entry.name}' ({symbol}) appears in no "
+                        "dynamics, cost or constraint: nothing decides its value"
+                    )
+        for c in self.at("integral"):
+            if self.model.is_discrete:
+                raise ProblemError(
+                    f"{self.name}: integral constraint '{c.name}': the model is discrete in time; "
+                    "carry the sum as a state s[k+1] = s[k] + ... with a bound at the end"
+                )
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
@@ -324,7 +458,8 @@ class OCP(Portable):
     def _check_start_bounds(self, x0: np.ndarray) -> None:
         excess = self.state_bounds.excess(x0)
         outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(x0)))
-        if outside.size and not self.has_free_start:
+        outside = outside[~self.start_is_free[outside]]
+        if outside.size:
             i = int(outside[0])
             low, high = (
                 np.asarray(b)[i] for b in (self.state_bounds.lower, self.state_bounds.upper)

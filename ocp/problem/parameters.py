@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -11,14 +11,36 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance, check_numbers, check_numeric
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_symbols
+from ocp.problem.constraint import Box
 from ocp.problem.portable import Portable
 
 # Two grids whose nodes differ by rounding must be taken as the same grid.
 _SAME_NODE = 1e-9
 
 
+class _Constant(Portable):
+    """What has one value along a run."""
+
+    name: str
+    symbol: ca.SX
+    kind: ClassVar[str]
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Instants in [0, 1] between which the value is smooth."""
+        return np.array([0.0, 1.0])
+
+    def checked(self, value: ArrayLike) -> np.ndarray:
+        """Return ``value`` as (m,), or raise ``ProblemError``."""
+        return check_numbers(value, self.symbol.numel(), f"{self.kind} '{self.name}'")
+
+    def at(self, value: np.ndarray, fraction: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
+        """Return the value at each fraction of the horizon, (len(fraction), m)."""
+        return np.tile(value, (len(fraction), 1))
+
+
 @dataclass(frozen=True, eq=False)
-class Parameter(Portable):
+class Parameter(_Constant):
     """A constant of the problem whose value may change from run to run.
 
     Args:
@@ -30,24 +52,77 @@ class Parameter(Portable):
     name: str
     symbol: ca.SX
     value: ArrayLike
+    kind: ClassVar[str] = "parameter"
 
     def __post_init__(self) -> None:
         """Check symbol and value."""
         check_symbols(self.symbol, f"parameter '{self.name}'")
         object.__setattr__(self, "value", self.checked(self.value))
 
+
+@dataclass(frozen=True, eq=False)
+class Unknown(_Constant):
+    """A constant that the optimiser chooses, as a control that never changes.
+
+    What others call a static parameter, a design variable or a decision variable: the mass of a
+    ship that is to be built, a rate constant that is to be estimated.
+
+    Args:
+        name: the key under which solutions and guesses have its value.
+        symbol: ``SX`` column (m,), in dynamics, costs and constraints.
+        guess: first guess (m,).
+        lower: least value, a number or (m,).
+        upper: largest value, a number or (m,).
+
+    Raises:
+        ProblemError: if symbol, guess or bounds do not fit together.
+    """
+
+    name: str
+    symbol: ca.SX
+    guess: ArrayLike
+    lower: ArrayLike = -np.inf
+    upper: ArrayLike = np.inf
+    kind: ClassVar[str] = "unknown constant"
+
+    def __post_init__(self) -> None:
+        """Check symbol, guess and bounds."""
+        check_instance(self.name, str, "the name of an unknown constant")
+        what = f"{self.kind} '{self.name}'"
+        check_symbols(self.symbol, what)
+        guess, box = self.checked(self.guess), Box(self.lower, self.upper)
+        box = box.sized(self.symbol.numel(), what)
+        if box.excess(guess).any():
+            raise ProblemError(
+                f"{what}: its guess {guess} is outside its bounds, {box.lower} to {box.upper}"
+            )
+        for name, value in (("guess", guess), ("lower", box.lower), ("upper", box.upper)):
+            object.__setattr__(self, name, value)
+
     @property
-    def knots(self) -> np.ndarray:
-        """Instants in [0, 1] between which the value is smooth."""
-        return np.array([0.0, 1.0])
+    def value(self) -> np.ndarray:
+        """The guess (m,)."""
+        return np.asarray(self.guess)
 
-    def checked(self, value: ArrayLike) -> np.ndarray:
-        """Return ``value`` as (m,), or raise ``ProblemError``."""
-        return check_numbers(value, self.symbol.numel(), f"parameter '{self.name}'")
+    @property
+    def box(self) -> Box:
+        """Its bounds, each (m,)."""
+        return Box(self.lower, self.upper)
 
-    def at(self, value: np.ndarray, fraction: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
-        """Return the value at each fraction of the horizon, (len(fraction), m)."""
-        return np.tile(value, (len(fraction), 1))
+
+@dataclass(frozen=True, eq=False)
+class StartValue(_Constant):
+    """The state at the start of a run, as a constant of it: ``Model.start``.
+
+    Args:
+        symbol: ``SX`` column (nx,).
+        value: where the start is declared to be (nx,).
+    """
+
+    symbol: ca.SX
+    value: np.ndarray
+    name: str = "x(t0)"
+    kind: ClassVar[str] = "start value"
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,21 +193,26 @@ class Signal(Portable):
         return samples[np.clip(index, 0, last)]
 
 
+# What stands in the vector p of a problem.
+Entry = Parameter | Signal | Unknown | StartValue
+
+
 @dataclass(frozen=True)
 class ParameterValues:
     """The numbers of one run, ready to be sampled on any grid.
 
     Attributes:
-        entries: the parameters and signals of the problem, in its order; n_p components in all.
+        entries: parameters, signals and other constants of the problem, in its order; n_p
+            components in all.
         values: their numbers, (size,) for a parameter, (samples, size) for a signal.
     """
 
-    entries: tuple[Parameter | Signal, ...]
+    entries: tuple[Entry, ...]
     values: tuple[np.ndarray, ...]
 
     @classmethod
     def of(
-        cls, entries: Sequence[Parameter | Signal], given: Mapping[str, ArrayLike] | None
+        cls, entries: Sequence[Entry], given: Mapping[str, ArrayLike] | None
     ) -> "ParameterValues":
         """Return the declared values, replaced by those ``given`` by name, all checked."""
         if given is not None:
@@ -184,4 +264,5 @@ class ParameterValues:
 
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""
-        return {e.name: v for e, v in zip(self.entries, self.values, strict=True)}
+        each = zip(self.entries, self.values, strict=True)
+        return {e.name: v for e, v in each if isinstance(e, Parameter | Signal)}

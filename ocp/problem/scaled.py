@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.problem.cache import once_per_problem
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import PLACES, Box, Constraint
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows, RowSizes
 from ocp.problem.model import Model
 from ocp.problem.nominal_sizes import Sizes, nominal_sizes
@@ -50,8 +50,9 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         float(_rounded(np.array(sizes.cost))),
         {name: _rounded(rows) for name, rows in sizes.rows.items()},
     )
-    m, symbols = ocp.model, ca.vertcat(ocp.model.x, ocp.model.u)
-    measured = ca.DM(np.concatenate([rounded.x, rounded.u])) * symbols
+    m = ocp.model
+    symbols = ca.vertcat(m.x, m.u, m.start)
+    measured = ca.DM(np.concatenate([rounded.x, rounded.u, rounded.x])) * symbols
 
     def in_sizes(expression: ca.SX | float, size: np.ndarray | float) -> ca.SX:
         return ca.substitute(ca.SX(expression), symbols, measured) / ca.DM(size)
@@ -64,6 +65,7 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         t=m.t,
         dt=m.dt,
         u_is_change=m.u_is_change,
+        start=m.start,
     )
     return ScaledOCP(
         name=ocp.name,
@@ -75,7 +77,10 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         control_bounds=_box(ocp.control_bounds, rounded.u),
         state_bounds=_box(ocp.state_bounds, rounded.x),
         constraints=tuple(_constraint(c, in_sizes, rounded.rows[c.name]) for c in ocp.constraints),
+        free_start=ocp.free_start,
+        start_bounds=_box(ocp.start_bounds, rounded.x),
         parameters=ocp.parameters,
+        unknowns=ocp.unknowns,
         smoothness=ocp.smoothness,
         original=ocp,
         sizes=rounded,
@@ -111,15 +116,17 @@ class ScaledOCP(OCP):
             place: np.concatenate(
                 [[], *[sizes.rows.get(c.name, np.ones(c.size)) for c in self.at(place)]]
             )
-            for place in ("path", "initial", "terminal")
+            for place in PLACES
         }
         return replace(
             rows,
             states=_with_units(rows.states, sizes.x),
             controls=_with_units(rows.controls, sizes.u),
             path=_with_units(rows.path, of_constraint["path"]),
+            start=_with_units(rows.start, sizes.x),
             initial=_with_units(rows.initial, of_constraint["initial"]),
             terminal=_with_units(rows.terminal, of_constraint["terminal"]),
+            integral=_with_units(rows.integral, of_constraint["integral"]),
         )
 
 

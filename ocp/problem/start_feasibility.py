@@ -19,7 +19,7 @@ def start_violation(ocp: OCP, data: RunData) -> str:
     ignored.
     """
     check_instance(ocp, OCP, "start_violation: the problem")
-    if ocp.has_free_start:
+    if ocp.start_is_free.all():
         return ""
     t, rows = np.array([data.t0]), ocp.rows
     found = [rows.states.largest_violation(data.x0[None, :], t)]

@@ -9,14 +9,11 @@ import casadi as ca
 import numpy as np
 
 from ocp.integration.one_step import RK4, Stage, interpolate
-from ocp.minimum_principle.necessary_conditions import (
-    MinimumPrinciple,
-    minimum_principle,
-    symbol_type,
-)
+from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
 from ocp.referee.chunked_rollout import ChunkedRollout
+from ocp.referee.extremal_law import ExtremalLaw, extremal_law, extremal_of
 from ocp.solution.solution import Solution
 
 
@@ -192,19 +189,14 @@ class ExtremalControls(ControlIntegrator):
     @classmethod
     def of(cls, ocp: OCP) -> Self:
         """Build the steps."""
-        conditions, functions, nx, n_p = (
-            minimum_principle(ocp),
-            ocp.functions,
-            ocp.model.nx,
-            ocp.p.numel(),
-        )
-        kind = symbol_type(conditions.flow)
-        x, z, z_node = kind.sym("x", nx), kind.sym("z", 2 * nx), kind.sym("z_node", 2 * nx)
+        known, functions, nx, n_p = extremal_law(ocp), ocp.functions, ocp.model.nx, ocp.p.numel()
+        kind, width = symbol_type(known.flow), known.flow.size1_in(0)
+        x, z, z_node = kind.sym("x", nx), kind.sym("z", width), kind.sym("z_node", width)
         restart, t, h = kind.sym("restart"), kind.sym("t"), kind.sym("h")
         p0, p1, costate = kind.sym("p0", n_p), kind.sym("p1", n_p), kind.sym("costate", nx)
-        begin = kind.sym("begin", 2 * nx)
+        begin = kind.sym("begin", width)
 
-        law = _control_of_time(conditions)
+        law = _control_of_time(known)
 
         def rate(y: Any, s: Any) -> Any:  # SX or MX, as the control is closed or implicit
             """d(x, cost, z)/ds; the control is that of z, not of x."""
@@ -215,8 +207,7 @@ class ExtremalControls(ControlIntegrator):
 
         end = RK4()(rate, ca.vertcat(x, 0, begin), 0.0, 1.0)
         x_next, cost, z_next = end[:nx], end[nx], end[nx + 1 :]
-        u_start = conditions.control(begin[:nx], begin[nx:], t, p0)
-        u_end = conditions.control(z_next[:nx], z_next[nx:], t + h, p1)
+        u_start, u_end = known.control(begin, t, p0), known.control(z_next, t + h, p1)
         core_inputs = [x, begin, t, h, p0, p1]
         zero, total = kind.zeros(ocp.model.nu), cost + ca.dot(costate, x_next)
         adjoint_step = ca.Function(
@@ -238,7 +229,8 @@ class ExtremalControls(ControlIntegrator):
         """Run states and costates beside the plant."""
         node = np.searchsorted(solution.fractions, steps.fractions[:-1] + 1e-12, side="right") - 1
         restart = np.append(True, np.diff(node) > 0).astype(float)[:, None]
-        z_node = np.hstack([solution.x, solution.costate])[node]
+        extremal = extremal_of(solution)
+        z_node = np.hstack([extremal.x, extremal.costate])[node]
         inputs = [restart, z_node, *steps.columns]
         x, outputs = self._march([start, z_node[0]], inputs, restarts)
         ends, _, costs, inner, u_start, u_end = outputs
@@ -264,16 +256,13 @@ _polynomial = once_per_problem(PolynomialControls.of)
 _extremal = once_per_problem(ExtremalControls.of)
 
 
-def _control_of_time(conditions: MinimumPrinciple) -> ca.Function:
+def _control_of_time(known: ExtremalLaw) -> ca.Function:
     """(z, t, p) -> the minimising control and dz/dt, through which no derivative passes.
 
     What is applied is a function of time; and where the control is an implicit root that was
     not found, its derivative does not exist.
     """
-    flow = conditions.flow
-    z, t, p = inputs = [
-        symbol_type(flow).sym(flow.name_in(i), flow.sparsity_in(i)) for i in range(3)
-    ]
-    nx = z.numel() // 2
-    outputs = [conditions.control(z[:nx], z[nx:], t, p), flow(*inputs)]
+    flow = known.flow
+    inputs = [symbol_type(flow).sym(flow.name_in(i), flow.sparsity_in(i)) for i in range(3)]
+    outputs = [known.control(*inputs), flow(*inputs)]
     return ca.Function("law", inputs, outputs, {"is_diff_in": [False] * 3})

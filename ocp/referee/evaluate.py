@@ -14,6 +14,9 @@ from ocp.referee.stationarity import final_costate, stationarity
 from ocp.referee.violation import invariant_drift, largest_violation
 from ocp.solution.solution import Solution
 
+# Accepted error of the cost, relative to its size.
+_TOLERANCE = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -59,7 +62,7 @@ class Evaluation:
 
 
 @interruptible
-def evaluate(solution: Solution, *, tolerance: float = 1e-9) -> Evaluation:
+def evaluate(solution: Solution, *, tolerance: float = _TOLERANCE) -> Evaluation:
     """Judge a solution by integrating its controls, whatever its solver says.
 
     The latest verdicts are kept with the problem: the second call costs nothing.
@@ -92,7 +95,7 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
         cost_error=truth.cost_error + (0.0 if in_open_loop else worth(solution, truth)),
         violation=violation.amount,
         worst=violation.where if violation.amount > 0.0 else "",
-        stationarity=stationarity(solution, truth),
+        stationarity=_stationarity(solution, truth),
         task_drift=invariant_drift(solution, truth),
         defect=float(defects(solution, truth).max()) if gap is None else gap,
         replay=truth.replay,
@@ -101,6 +104,13 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
         resolution=truth.resolution,
         truth=truth,
     )
+
+
+def _stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None:
+    """The residual of the minimum principle, which is that of the normal form."""
+    if solution.normal is not None:
+        return _evaluation(solution.normal, _TOLERANCE).stationarity
+    return stationarity(solution, truth)
 
 
 def _lost(truth: ReferenceTrajectory) -> Evaluation:
@@ -134,6 +144,10 @@ def costates_along(solution: Solution) -> Solution:
             where the dynamics are too stiff or too unstable for explicit steps in open loop.
     """
     check_instance(solution, Solution, "costates_along: solution")
+    if solution.normal is not None:
+        normal = costates_along(solution.normal)
+        nx = solution.problem.model.nx
+        return solution.with_(normal=normal, costate=normal.costate[:, :nx])
     truth = integrate_controls(solution)
     if not truth.has_adjoint:
         return solution

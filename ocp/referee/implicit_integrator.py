@@ -11,10 +11,11 @@ import casadi as ca
 import numpy as np
 
 from ocp.integration.one_step import interpolate
-from ocp.minimum_principle.necessary_conditions import minimum_principle, symbol_type
+from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
 from ocp.referee.control_integrators import Integrated, Restarts, Steps
+from ocp.referee.extremal_law import extremal_law, extremal_of
 from ocp.solution.solution import Solution
 
 # No step is longer than this fraction of an interval (an odd one: no wave is in step with it),
@@ -179,17 +180,17 @@ class _Extremal:
     @property
     def width(self) -> int:
         """How many numbers are integrated: the plant, and states and costates beside it."""
-        return 3 * self.solution.problem.model.nx
+        return self.solution.problem.model.nx + 2 * self._extremal.problem.model.nx
 
     @property
     def sizes(self) -> np.ndarray:
         """Their sizes."""
-        x, costate = _sizes(self.solution.x), _sizes(self.solution.costate)
-        return np.concatenate([x, x, costate])
+        parts = self.solution.x, self._extremal.x, self._extremal.costate
+        return np.concatenate([_sizes(part) for part in parts])
 
     def begin(self, start: np.ndarray, t: float) -> np.ndarray:
         """Return them at the start."""
-        return np.concatenate([start, self.solution.x[0], self.solution.costate[0]])
+        return np.concatenate([start, self._extremal.x[0], self._extremal.costate[0]])
 
     def restarted(self, w: np.ndarray, t: float) -> np.ndarray:
         """Return them at a knot: at a node, states and costates are the solution's."""
@@ -197,7 +198,7 @@ class _Extremal:
         k = int(np.abs(nodes - t).argmin())
         if abs(nodes[k] - t) > 1e-12 * self.solution.duration:
             return w
-        return np.concatenate([w[:nx], self.solution.x[k], self.solution.costate[k]])
+        return np.concatenate([w[:nx], self._extremal.x[k], self._extremal.costate[k]])
 
     def drive(self, t: np.ndarray) -> np.ndarray:
         """Return nothing for each interval."""
@@ -208,13 +209,14 @@ class _Extremal:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the controls at both ends of every step, (K, nu) each."""
         nx = self.solution.problem.model.nx
-        law = minimum_principle(self.solution.problem).control.map(len(ends))
+        law = extremal_law(self.solution.problem).control.map(len(ends))
         sides = ((x, steps.t[:-1], steps.p_start), (ends, steps.t[1:], steps.p_end))
-        u_start, u_end = (
-            np.array(law(w[:, nx : 2 * nx].T, w[:, 2 * nx :].T, t[None, :], p.T)).T
-            for w, t, p in sides
-        )
+        u_start, u_end = (np.array(law(w[:, nx:].T, t[None, :], p.T)).T for w, t, p in sides)
         return u_start, u_end
+
+    @property
+    def _extremal(self) -> Solution:
+        return extremal_of(self.solution)
 
 
 def _piece(ocp: OCP, count: int, samples: int, tolerance: float, most_steps: int) -> ca.Function:
@@ -256,13 +258,14 @@ def _known_rate(ocp: OCP, count: int) -> ca.Function:
 
 def _extremal_rate(ocp: OCP) -> ca.Function:
     """(plant, state, costate; s; data) -> h times their rates and h L, data = (t, h, p0, p1)."""
-    conditions, functions = minimum_principle(ocp), ocp.functions
-    kind, nx, n_p = symbol_type(conditions.flow), ocp.model.nx, ocp.p.numel()
-    w, s, t, h = kind.sym("w", 3 * nx), kind.sym("s"), kind.sym("t"), kind.sym("h")
+    known, functions, nx, n_p = extremal_law(ocp), ocp.functions, ocp.model.nx, ocp.p.numel()
+    kind = symbol_type(known.flow)
+    w, s = kind.sym("w", nx + known.flow.size1_in(0)), kind.sym("s")
+    t, h = kind.sym("t"), kind.sym("h")
     p0, p1 = kind.sym("p0", n_p), kind.sym("p1", n_p)
     at, p = t + s * h, interpolate(p0, p1, s)
-    now = (w[:nx], conditions.control(w[nx : 2 * nx], w[2 * nx :], at, p), at, p)
-    flow = conditions.flow(w[nx:], at, p)
+    now = (w[:nx], known.control(w[nx:], at, p), at, p)
+    flow = known.flow(w[nx:], at, p)
     rates = [h * ca.vertcat(functions.rate(*now), flow), h * functions.running_cost(*now)]
     return ca.Function("rate", [w, s, ca.vertcat(t, h, p0, p1)], rates)
 

@@ -49,5 +49,6 @@ def _numbers(solution: Solution, tolerance: float) -> tuple:
     """Return everything that a verdict depends on, as a key."""
     s = solution
     arrays = (s.t, s.x, s.x0, s.costate, s.u, s.breaks)
-    given = ((name, value.tobytes()) for name, value in s.data.values.as_dict().items())
-    return (tolerance, s.control_kind, *(array.tobytes() for array in arrays), *given)
+    given = (value.tobytes() for value in s.data.values.values)
+    own = (tolerance, s.control_kind, *(array.tobytes() for array in arrays), *given)
+    return own if s.normal is None else (*own, _numbers(s.normal, tolerance))

@@ -77,6 +77,20 @@ class ReferenceTrajectory:
         """The largest distance of instants at which states, rows and costs are looked at [s]."""
         return float(np.diff(self.t).max())
 
+    def integral(self, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Return the integral over the horizon (m,), by Simpson's rule over pairs of steps.
+
+        Args:
+            left: values at the starts of the steps (K, m).
+            right: values at their ends, limits from the left (K, m).
+        """
+        first, second = np.diff(self.t)[::2], np.diff(self.t)[1::2]
+        both = first + second
+        weights = (2.0 - second / first, both**2 / (first * second), 2.0 - first / second)
+        values = (left[::2], right[::2], right[1::2])
+        parts = [(w * both) @ v for w, v in zip(weights, values, strict=True)]
+        return np.sum(parts, axis=0) / 6.0
+
 
 @dataclass(frozen=True, eq=False)
 class Replayed:
@@ -104,7 +118,7 @@ class Replayed:
         solution = self.solution
         if solution.problem.model.is_discrete:
             return solution.fractions
-        values = solution.problem.parameter_values(solution.parameters)
+        values = solution.data.values
         t0, duration = float(solution.t[0]), solution.duration
         knots = np.union1d(solution.fractions, values.knots)
         knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
@@ -135,9 +149,9 @@ class Replayed:
             inside = _uneven(inside)
         fine = np.append((knots[:-1, None] + inside * np.diff(knots)[:, None]).ravel(), 1.0)
         t = solution.t[0] + fine * solution.duration
-        values = ocp.parameter_values(solution.parameters)
+        values = solution.data.values
         steps = Steps(fine, t, *values.on(fine))
-        start = (solution.x[0] if ocp.has_free_start else solution.x0) + self.moved
+        start = ocp.start_of(solution.x0, solution.x[0]) + self.moved
         restarts = self._restarts(substeps, len(t) - 1)
         if tolerance is None:
             found = integrator_of(solution).integrate(solution, steps, start, restarts)

@@ -148,8 +148,11 @@ def _start_residual(solution: Solution, truth: ReferenceTrajectory, costate: np.
     value, normals = (
         np.array(f(*begin)) for f in (ocp.functions.initial, ocp.functions.initial_slope)
     )
-    mu = _multipliers(ocp.rows.initial.box, value.ravel(), normals, -costate)
-    return float(np.abs(costate + normals.T @ mu).max(initial=0.0))
+    free, box, start = ocp.start_is_free, ocp.start_box, truth.x[0]
+    mu = _multipliers(ocp.rows.initial.box, value.ravel(), normals[:, free], -costate[free])
+    # Natural residual of the box.
+    moved = box.clip(start - (costate + normals.T @ mu))
+    return float(np.abs(start - moved)[free].max(initial=0.0))
 
 
 def _time_residual(
@@ -172,11 +175,7 @@ def _time_residual(
         + (at[3].ravel() - truth.t[0]) * np.array(h.time_slope.map(steps)(*at, p.T)).ravel()
         for at, p in ((now, truth.p_start), (then, truth.p_end))
     )
-    first, second = np.diff(truth.t)[::2], np.diff(truth.t)[1::2]
-    both = first + second
-    weights = (2.0 - second / first, both**2 / (first * second), 2.0 - first / second)
-    values = (left[::2], right[::2], right[1::2])
-    mean = sum((w * v) @ both for w, v in zip(weights, values, strict=True)) / 6.0
+    mean = float(truth.integral(left[:, None], right[:, None])[0]) / solution.duration
     duration = np.array([solution.duration])
-    slope = mean / solution.duration + at_end
+    slope = mean + at_end
     return float(np.abs(duration - ocp.time_box.clip(duration - slope))[0])

@@ -25,6 +25,14 @@ def invariant_drift(solution: Solution, truth: ReferenceTrajectory) -> float:
     return float(ocp.rows.invariants.excess(values).max(initial=0.0))
 
 
+def integrals(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
+    """Return the integrals of the integral constraints over the horizon, (m,)."""
+    along = solution.problem.functions.integrands.map(len(truth.t) - 1)
+    starts = along(truth.x[:-1].T, truth.u_start.T, truth.t[None, :-1], truth.p_start.T)
+    ends = along(truth.ends.T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
+    return truth.integral(np.array(starts).T, np.array(ends).T)
+
+
 def path_values(
     solution: Solution, truth: ReferenceTrajectory
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -64,6 +72,7 @@ def values_at_ends(
     functions, rows, p = solution.problem.functions, solution.problem.rows, solution.data.values
     first = functions.initial(truth.x[0], truth.t[0], truth.p_start[0])
     last = functions.terminal(truth.x[-1], truth.t[-1], p.at(1.0)[0])
+    yield rows.start, truth.x[:1], truth.t[:1]
     yield rows.initial, np.array(first).T, truth.t[:1]
     yield rows.terminal, np.array(last).T, truth.t[-1:]
 
@@ -77,6 +86,8 @@ def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Viol
     yield rows.controls.largest_violation(truth.u_end, t[1:])
     for group, values, instants in values_at_ends(solution, truth):
         yield group.largest_violation(values, instants)
+    if len(rows.integral):
+        yield rows.integral.largest_violation(integrals(solution, truth)[None, :], t[-1:])
     yield Violation(
         float(ocp.time_box.excess(np.array([solution.duration]))[0]), rows.time, float(t[-1])
     )

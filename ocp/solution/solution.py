@@ -14,6 +14,7 @@ from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
+from ocp.normal_form.normal_form import normal_form
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
@@ -75,8 +76,11 @@ class Solution:
         work: integrations, Jacobians and factorisations.
         history: cost and residual per iteration, as far as the method has them.
         parameters: parameter values and signals of this run, by name.
+        unknowns: values of the unknown constants, by name.
         build_time: time of ``build`` [s].
         solve_time: time of the method in ``run`` [s]; the comparison with the referee comes on top.
+        normal: the same in the terms that the method got, see ``normal_form``; None where they
+            are those of the problem.
     """
 
     problem: OCP
@@ -96,8 +100,10 @@ class Solution:
     work: Work = field(default_factory=Work)
     history: Mapping[str, np.ndarray] = field(default_factory=dict)
     parameters: Mapping[str, np.ndarray] = field(default_factory=dict)
+    unknowns: Mapping[str, np.ndarray] = field(default_factory=dict)
     build_time: float = 0.0
     solve_time: float = 0.0
+    normal: "Solution | None" = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """Check kinds and shapes, and that no number is NaN."""
@@ -182,7 +188,25 @@ class Solution:
     @property
     def data(self) -> RunData:
         """The numbers of the run it comes from."""
-        return RunData(self.x0, float(self.t[0]), self.problem.parameter_values(self.parameters))
+        start = self.problem.start_of(self.x0, self.x[0])
+        values = self.problem.values_of(self.parameters, self.unknowns, start)
+        return RunData(self.x0, float(self.t[0]), values)
+
+    @property
+    def sensitivity(self) -> dict[str, np.ndarray]:
+        """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs."""
+        if self.normal is None:
+            return {}
+        form, costate = normal_form(self.problem), self.normal.costate[0]
+        return {} if form is None else {name: costate[at] for name, at in form.unknowns.items()}
+
+    @property
+    def multipliers(self) -> dict[str, np.ndarray]:
+        """The price of every integral constraint, by name: dJ*/d(upper bound) is minus it."""
+        if self.normal is None:
+            return {}
+        form, costate = normal_form(self.problem), self.normal.costate[-1]
+        return {} if form is None else {name: costate[at] for name, at in form.integrals.items()}
 
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
@@ -221,6 +245,8 @@ class Solution:
         signals of the problem are smooth between them.
         """
         times = _instants(t, "control")
+        if self.control_kind == "extremal" and self.normal is not None:
+            return self.normal.control(times)[..., : self.problem.model.nu]
         if self.control_kind == "held":
             index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
             return self.u[np.clip(index, 0, len(self.u) - 1)]
@@ -231,7 +257,7 @@ class Solution:
             return values if times.ndim else values[0]
         points = np.atleast_1d(times)
         tau = (points - self.t[0]) / self.duration
-        p = self.problem.parameter_values(self.parameters).at(tau)
+        p = self.data.values.at(tau)
         law = minimum_principle(self.problem).control
         args = (self.state(points), self.costate_at(points), points[:, None], p)
         values = np.array(law.map(len(points))(*[a.T for a in args])).T
@@ -265,6 +291,10 @@ class Solution:
 
     def _canonical(self, t: np.ndarray) -> np.ndarray:
         """State and costate of an extremal."""
+        if self.normal is not None:
+            m = self.problem.model
+            x, costate = self.normal.state(t), self.normal.costate_at(t)
+            return np.concatenate([x[..., : m.nx], costate[..., : m.nx]], axis=-1)
         return self._cubics(np.clip(t, self.t[0], self.t[-1]))
 
     @cached_property
@@ -297,17 +327,23 @@ class Solution:
         Raises:
             ProblemError: if it cannot be written; a file that was there is as it was.
         """
+        content = self._content() | fingerprint_entries(self.problem)
+        return write_archive(path, "solution", content)
+
+    def _content(self) -> dict[str, Any]:
+        """Return what an archive keeps."""
         content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
         content |= {
             f"{group}/{key}": value
-            for group in ("history", "parameters")
+            for group in ("history", "parameters", "unknowns")
             for key, value in getattr(self, group).items()
         }
         content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
         content |= {"status": self.status.name, "problem": self.problem.name}
         content |= {"breaks": self.breaks}
-        content |= fingerprint_entries(self.problem)
-        return write_archive(path, "solution", content)
+        if self.normal is not None:
+            content |= {f"normal/{k}": value for k, value in self.normal._content().items()}
+        return content
 
     @classmethod
     def load(cls, path: str | Path, problem: OCP) -> "Solution":
@@ -335,13 +371,15 @@ class Solution:
     @classmethod
     def _of(cls, data: Mapping[str, np.ndarray], problem: OCP) -> "Solution":
         """Return the solution of an archive."""
-        groups: dict[str, dict] = {"history": {}, "parameters": {}, "work": {}, "probe": {}}
+        names = ("history", "parameters", "unknowns", "work", "probe", "normal")
+        groups: dict[str, dict] = {name: {} for name in names}
         for name, value in data.items():
             group, _, key = name.partition("/")
             if key:
                 groups[group][key] = value
         if str(data["status"]) not in Status.__members__:
             raise ProblemError(f"its status is '{data['status']}'")
+        form = normal_form(problem) if groups["normal"] else None
         return cls(
             problem=problem,
             status=Status[str(data["status"])],
@@ -349,6 +387,8 @@ class Solution:
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
             history=groups["history"],
             parameters=groups["parameters"],
+            unknowns=groups["unknowns"],
+            normal=None if form is None else cls._of(groups["normal"], form.problem),
             work=Work(**{k: int(v) for k, v in groups["work"].items()}),
         )
 

@@ -6,8 +6,15 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import Solution, Status, UnsupportedProblem
-from ocp.internal import check_flag, check_instance, check_positive, check_whole
+from ocp import Solution, Status, UnsupportedProblem, evaluate
+from ocp.internal import (
+    InNormalForm,
+    check_flag,
+    check_instance,
+    check_positive,
+    check_whole,
+    normal_form,
+)
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.certificate import (
     AGREEMENT,
@@ -45,6 +52,7 @@ from solvers.direct.multiple_shooting import MultipleShooting
 _METHODS = 2
 RELATIVE = "relative agreement"
 FEASIBILITY, SECOND_ORDER = "feasibility", "second order"
+AS_WRITTEN = "as written"
 # Digits asked of two methods: where no path constraint is active, and where one is.
 SMOOTH_DIGITS, OTHER_DIGITS = 8, 5
 # Digits count from 1; of a smaller cost itself two methods may differ by this share.
@@ -131,6 +139,9 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
     effort = effort or CertifyOptions()
     check_instance(solution, Solution, "certify: solution")
     check_instance(effort, CertifyOptions, "certify: effort")
+    form = normal_form(solution.problem)
+    if form is not None:
+        return _in_terms_of_the_user(solution, effort, InNormalForm(form))
     clock = _Clock(effort.seconds, perf_counter())
     coarse, stiff = _coarse(solution, effort)
     estimates, silent = _estimates(solution, coarse, clock)
@@ -153,6 +164,28 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
         *_global(best, effort, _searching(effort, coarse), clock),
     ]
     return Certificate(solution.problem.name, tuple(estimates), tuple(checks))
+
+
+def _in_terms_of_the_user(
+    solution: Solution, effort: CertifyOptions, rewriting: InNormalForm
+) -> Certificate:
+    """Certify the normal form, and ask the referee for the problem as it is written."""
+    found = certify(rewriting.written(solution), effort)
+    estimates = [replace(e, solution=rewriting.answer(e.solution)) for e in found.estimates]
+    best = estimates[0]
+    verdict = evaluate(best.solution)
+    apart, limit = abs(verdict.cost - evaluate(rewriting.written(best.solution)).cost), 1e-8
+    checks = [
+        Check.at_most(
+            f"{AS_WRITTEN}, cost",
+            apart / max(1.0, abs(verdict.cost)),
+            limit,
+            f"the referee's costs of problem and normal form differ by {apart:.1e}",
+        ),
+        _feasibility(replace(best, violation=verdict.violation), best.is_extremal),
+    ]
+    checks[1] = replace(checks[1], name=f"{AS_WRITTEN}, {FEASIBILITY}")
+    return replace(found, estimates=tuple(estimates), checks=(*found.checks, *checks))
 
 
 def _coarse(solution: Solution, effort: CertifyOptions) -> tuple[Solution, str]:

@@ -43,7 +43,8 @@ _SAME_COST = 1e-7
 def other_data(solution: Solution) -> str:
     """Say which number of a run is not the problem's own, which is all that is searched here."""
     ocp, own, run = solution.problem, RunData.of(solution.problem), solution.data
-    if not ocp.has_free_start and not np.array_equal(own.x0, run.x0):
+    given = ~ocp.start_is_free
+    if not np.array_equal(own.x0[given], run.x0[given]):
         return f"the start {run.x0} is not that of the problem, {own.x0}"
     if own.t0 != run.t0:
         return f"t0 = {run.t0:g} s is not that of the problem, {own.t0:g} s"

@@ -72,7 +72,7 @@ def _along(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
     """H at the nodes, and the integral of H_t up to each, by Simpson's rule."""
     h, t = hamiltonian(solution.problem), solution.t
     middle = (t[:-1] + t[1:]) / 2.0
-    p = solution.problem.parameter_values(solution.parameters)
+    p = solution.data.values
 
     def at(times: np.ndarray, function: ca.Function) -> np.ndarray:
         fractions = (times - t[0]) / solution.duration

@@ -74,8 +74,10 @@ class TimeScaledProblem:
         rate = ca.substitute(m.f, m.u, u)
         time = ocp.time_box if isinstance(duration, FreeTime) else Box([duration], [duration])
         data, box = self.start.data, ocp.state_bounds
+        later = Box.unbounded(1 + count)
         begin = np.append(data.x0, data.t0)
-        own = () if ocp.has_free_start else (self._fixed("start", m.x, data.x0),)
+        given = np.flatnonzero(~ocp.start_is_free)
+        own = (self._fixed("start", m.x[given.tolist(), :], data.x0[given]),) if given.size else ()
         states = ca.vertcat(m.x, m.t, self._durations)
         arc = Signal(self._name("arc"), self._now, np.vstack([np.eye(count), np.eye(count)[-1]]))
         return OCP(
@@ -95,6 +97,7 @@ class TimeScaledProblem:
                 np.concatenate([np.asarray(box.lower), [-np.inf], np.zeros(count)]),
                 np.concatenate([np.asarray(box.upper), np.full(1 + count, np.inf)]),
             ),
+            start_bounds=ocp.start_bounds & later,
             constraints=(
                 *own,
                 self._fixed("begin", m.t, data.t0),
@@ -164,8 +167,7 @@ class TimeScaledProblem:
         p = np.tile(self.start.data.values.at(0.0), (len(arc), 1))
         x, t = answer.x[:, : m.nx].copy(), answer.x[:, m.nx].copy()
         t[0] = self.start.data.t0
-        if not ocp.has_free_start:
-            x[0] = self.start.data.x0
+        x[0] = ocp.start_of(self.start.data.x0, x[0])
         ends = [
             np.array(
                 controls.map(len(arc))(*[v.T for v in (x[k], t[k][:, None], answer.u, p, arc)])

@@ -199,7 +199,7 @@ class CollocatedProblem:
                 for box in (ocp.state_bounds, ocp.control_bounds, ocp.time_box)
             )
             all_ = self._filled(inf, 0.0, 0.0)
-            all_.z[:nx, 0] = state[:, 0] if ocp.has_free_start else data.x0
+            all_.z[:nx, 0] = ocp.start_of(data.x0, np.asarray(getattr(ocp.start_box, side)))
             all_.z[nx:] = time[0, 0] / self.time_unit
             all_.c[:] = control
             all_.x[:] = state

@@ -12,10 +12,8 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
-    in_original_units,
-    in_own_units,
     judged,
-    scaled,
+    rewriting_of,
 )
 from solvers.collocation.collocation import Collocation
 from solvers.collocation.collocation_points import HIGHEST, LOWEST
@@ -115,11 +113,10 @@ def refine_mesh(
     check_instance(start, Solution, "refine_mesh: start")
     solver = solver or Collocation(intervals=10)
     check_instance(solver, Collocation, "refine_mesh: solver")
-    if (own := scaled(start.problem)) is not None:
-        found = refine_mesh(
-            in_own_units(start, own), solver=solver, accuracy=accuracy, rounds=rounds
-        )
-        return replace(found, solution=in_original_units(found.solution, own))
+    if (rewriting := rewriting_of(start.problem)) is not None:
+        written = rewriting.written(start)
+        found = refine_mesh(written, solver=solver, accuracy=accuracy, rounds=rounds)
+        return replace(found, solution=rewriting.answer(found.solution))
     cells = _Cells.of(solver.mesh_of(start.problem))
     solution, done, made, work, iterations = start, [], 0.0, Work(), 0
     solve_time = 0.0

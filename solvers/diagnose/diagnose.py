@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ocp import OCP, ProblemError, Solution
-from ocp.internal import RunData
+from ocp.internal import RunData, normal_form
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.checks.activity import activity
 from solvers.diagnose.checks.curvature import curvature
@@ -97,6 +97,10 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
 
 
 def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProblem:
+    form = normal_form(asked.problem if isinstance(asked, Solution) else asked)
+    if form is not None:
+        normal = asked.normal if isinstance(asked, Solution) else None
+        asked = normal or form.problem
     if isinstance(asked, Solution):
         return DiagnosedProblem(asked.problem, asked.data, solver, asked)
     return DiagnosedProblem(asked, RunData(asked.start(), 0.0, asked.parameter_values()), solver)

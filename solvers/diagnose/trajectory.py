@@ -58,7 +58,7 @@ def _boxed(subject: DiagnosedProblem) -> Iterator[_Row]:
     columns |= {e.element_hash(): tr.nz + i for i, e in enumerate(ca.vertsplit(m.u))}
     for demand, symbol, lower, upper in (*of_box(subject, "state"), *of_box(subject, "control")):
         column = columns[symbol.element_hash()]
-        given = column < m.nx and not ocp.has_free_start
+        given = column < m.nx and not ocp.start_is_free[column]
         for j in range(column + width * given, tr.size, width):
             yield _Row(demand, count + j, j // width, lower, upper)
 

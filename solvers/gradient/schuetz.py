@@ -26,7 +26,7 @@ from ocp.internal import (
     check_instance,
     check_not_negative,
     check_whole,
-    interruptible,
+    refuse_free_ends,
 )
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
@@ -100,10 +100,10 @@ class Schuetz(ScalingSolver):
         """Set what is left open; see ``Solver``."""
         return replace(self, compiled=compiled or self.compiled, judged=False)
 
-    @interruptible
-    def build(self, ocp: OCP) -> Program:
+    def build_normal(self, ocp: OCP) -> Program:
         """Build it; a fixed step has units, and is taken in those of the problem as written."""
-        return self.prepare(ocp) if isinstance(self.step, FixedStep) else super().build(ocp)
+        fixed = isinstance(self.step, FixedStep)
+        return self.prepare(ocp) if fixed else super().build_normal(ocp)
 
     def prepare(self, ocp: OCP) -> "SchuetzProgram":
         """Build roll-out and costate sweep."""
@@ -121,8 +121,7 @@ def _refuse_constraints(ocp: OCP) -> None:
         raise UnsupportedProblem(f"{ocp.name}: Schuetz takes no {c.at} constraint ('{c.name}')")
     if ocp.state_bounds.is_active:
         raise UnsupportedProblem(f"{ocp.name}: Schuetz takes no state bounds")
-    if ocp.has_free_time:
-        raise UnsupportedProblem(f"{ocp.name}: Schuetz takes no free final time")
+    refuse_free_ends(ocp, "Schuetz")
 
 
 @dataclass(frozen=True, eq=False)

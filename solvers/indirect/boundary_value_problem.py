@@ -30,7 +30,7 @@ class ExtremalProblem:
         roll: (z, T, t0, fraction, share, p0, p1) of all steps -> z and cost after each.
         slopes: the same -> derivative of each step in z and in T.
         ends: (z, nu, t, p) -> end conditions, derivatives in z, nu, t.
-        starts: (z, mu, t, p) -> start conditions, derivatives in z, mu.
+        starts: (z, mu, t, p, x0) -> start conditions, derivatives in z, mu.
         one: a step and its slope, of which ``roll`` and ``slopes`` are made.
     """
 
@@ -176,7 +176,7 @@ class ExtremalProblem:
         self, z: np.ndarray, mu: np.ndarray, schedule: ShootingSchedule, x0: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if self.ocp.has_free_start:
-            value, in_z, in_mu = self.starts(z, mu, schedule.t0, schedule.p_first)
+            value, in_z, in_mu = self.starts(z, mu, schedule.t0, schedule.p_first, x0)
             return value.ravel(), in_z, in_mu
         nx = self.shape.nx
         return z[:nx] - x0, np.eye(nx, 2 * nx), np.empty((nx, 0))

@@ -38,12 +38,13 @@ def canonical_step(
 
 
 def start_conditions(ocp: OCP, optimality: MinimumPrinciple) -> ca.Function:
-    """Return (z, mu, t, p) -> what vanishes at t0, and its derivatives in z and mu."""
+    """Return (z, mu, t, p, x0) -> what vanishes at t0, and its derivatives in z and mu."""
     z = ca.SX.sym("z", 2 * ocp.model.nx)
-    mu, t, p = (ca.SX.sym(n, optimality.start.sparsity_in(n)) for n in ("mu", "t", "p"))
-    value = optimality.start(z[: ocp.model.nx], z[ocp.model.nx :], mu, t, p)
+    names = ("mu", "t", "p", "x0")
+    mu, t, p, x0 = (ca.SX.sym(n, optimality.start.sparsity_in(n)) for n in names)
+    value = optimality.start(z[: ocp.model.nx], z[ocp.model.nx :], mu, t, p, x0)
     derivatives = [ca.densify(ca.jacobian(value, v)) for v in (z, mu)]
-    return ca.Function("starts", [z, mu, t, p], [value, *derivatives])
+    return ca.Function("starts", [z, mu, t, p, x0], [value, *derivatives])
 
 
 def end_conditions(ocp: OCP, optimality: MinimumPrinciple) -> ca.Function:

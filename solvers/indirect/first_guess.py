@@ -24,8 +24,7 @@ def first_unknowns(
     costate = guess.sample("costate", nodes, shape.nx) if guess else None
     duration = (guess.duration if guess else None) or ocp.duration
     x = np.tile(data.x0, (len(nodes), 1)) if x is None else x
-    if not ocp.has_free_start:
-        x = np.vstack([data.x0, x[1:]])
+    x = np.vstack([ocp.start_of(data.x0, x[0]), x[1:]])
     z = np.hstack([x, np.zeros_like(x) if costate is None else costate])
     mu, nu = _balancing(extremals, z, schedule, duration)
     return shape.join(z[:-1], mu, nu, duration)
@@ -37,7 +36,7 @@ def _balancing(
     """Return the multipliers that best balance the costates of z at both ends."""
     shape, nx = extremals.shape, extremals.shape.nx
     mu, nu, t1 = np.zeros(shape.n_mu), np.zeros(shape.n_nu), schedule.t0 + duration
-    value, _, in_mu = extremals.starts(z[0], mu, schedule.t0, schedule.p_first)
+    value, _, in_mu = extremals.starts(z[0], mu, schedule.t0, schedule.p_first, z[0, :nx])
     mu = -np.linalg.lstsq(in_mu[-nx:], value[-nx:].ravel(), rcond=None)[0]
     value, _, in_nu, _ = extremals.ends(z[-1], nu, t1, schedule.p_last)
     nu = -np.linalg.lstsq(in_nu[:nx], value[:nx].ravel(), rcond=None)[0]

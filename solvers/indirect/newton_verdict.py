@@ -12,6 +12,8 @@ from solvers.indirect.shooting_segments import SegmentTrajectories, ShootingSche
 
 # An eigenvalue of H_uu below minus this is no rounding error.
 _CONCAVE = 1e-9
+# A start beyond its bounds by less, relative to 1 + its size, is on them.
+_OUTSIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,12 @@ def verdict(
         return Status.FAILED, (
             f"the stationary final time, {motion.duration:.4g} s, is outside its bounds, which "
             "this method does not impose: use a direct method"
+        )
+    start = extremals.ocp.rows.start.largest_violation(motion.x[:1], motion.t[:1])
+    if start.row is not None and start.amount > _OUTSIDE * (1.0 + abs(motion.x[0]).max()):
+        return Status.FAILED, (
+            f"the stationary start is outside its bounds ({start}), which this method does not "
+            "impose: use a direct method"
         )
     concave = concave_at(extremals, motion.paths, schedule, motion.duration, below=-_CONCAVE)
     if concave is not None:

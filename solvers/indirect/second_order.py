@@ -174,7 +174,7 @@ def _tangent_curvature(
     second variation is dx' Y c, and what the manifold bends.
     """
     nx, m = extremals.shape.nx, extremals.shape.n_mu
-    _, in_z, _ = extremals.starts(z0, mu, schedule.t0, schedule.p_first)
+    _, in_z, _ = extremals.starts(z0, mu, schedule.t0, schedule.p_first, z0[:nx])
     normals, bending = in_z[:m, :nx], in_z[m:, :nx]
     tangent = np.linalg.svd(normals)[2][m:]
     across = np.eye(nx) - tangent.T @ tangent

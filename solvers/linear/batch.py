@@ -16,7 +16,6 @@ from ocp.internal import (
     RunData,
     RunResult,
     check_flag,
-    interruptible,
 )
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.stacked_prediction import StackedPrediction
@@ -47,8 +46,7 @@ class Batch(MethodSolver):
         super().__post_init__()
         check_flag(self.prestabilise, "Batch: prestabilise")
 
-    @interruptible
-    def build(self, ocp: OCP) -> "BatchProgram":
+    def prepare(self, ocp: OCP) -> "BatchProgram":
         """Stack and factorise."""
         lq = linear_quadratic(ocp)
         recursion.refuse_constraints(lq, "Batch")

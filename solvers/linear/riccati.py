@@ -21,7 +21,6 @@ from ocp.internal import (
     RunData,
     RunResult,
     check_choice,
-    interruptible,
 )
 from solvers.linear import regulator_gains as recursion
 
@@ -49,8 +48,7 @@ class Riccati(MethodSolver):
         super().__post_init__()
         check_choice(self.horizon, ("finite", "infinite"), "Riccati: horizon")
 
-    @interruptible
-    def build(self, ocp: OCP) -> "RiccatiProgram":
+    def prepare(self, ocp: OCP) -> "RiccatiProgram":
         """Read the matrices; where they are constant, do the recursion."""
         problem = with_stationary_end(ocp) if self.horizon == "infinite" else ocp
         lq = linear_quadratic(problem)

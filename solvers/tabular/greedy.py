@@ -17,9 +17,9 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    refuse_free_ends,
 )
 from solvers.tabular.greedy_step import OneStep, one_step
-from solvers.tabular.refusal import refuse_free_ends
 
 
 @dataclass(frozen=True)

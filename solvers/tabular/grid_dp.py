@@ -25,12 +25,11 @@ from ocp.internal import (
     check_instance,
     check_not_negative,
     check_whole,
-    interruptible,
+    refuse_free_ends,
 )
 from solvers.tabular.bellman import Bellman, ValueFunction
 from solvers.tabular.grid_functions import GridFunctions
 from solvers.tabular.policy_run import PolicyRun, follow_policy
-from solvers.tabular.refusal import refuse_free_ends
 from solvers.tabular.state_grid import Axis, StateGrid
 
 Points = int | tuple[int | Axis, ...]
@@ -102,8 +101,7 @@ class GridDP(MethodSolver):
         """By how much a terminal constraint may be missed."""
         return self.terminal_slack
 
-    @interruptible
-    def build(self, ocp: OCP) -> "GridDPProgram":
+    def prepare(self, ocp: OCP) -> "GridDPProgram":
         """Lay the grids and build the functions of a step."""
         check_instance(ocp, OCP, "GridDP: the problem")
         refuse_free_ends(ocp, "GridDP")

@@ -137,7 +137,7 @@ def test_batch_is_riccati_on_any_horizon(plant, steps):
 
 @pytest.mark.parametrize(("plant", "cost"), list(zip(PLANTS, COSTS, strict=True)))
 def test_cost_to_go_of_the_thesis_plants(plant, cost):
-    program = Riccati().build(thesis_regulator(plant, 50))
+    program = Riccati().prepare(thesis_regulator(plant, 50))
     assert program.run().cost == pytest.approx(cost, abs=1e-8)
     assert evaluate(program.run()).cost == pytest.approx(cost, abs=1e-6)
     assert np.ones(3) @ program.P[0] @ np.ones(3) == pytest.approx(cost, abs=1e-8)
@@ -157,19 +157,19 @@ def test_plain_batch_loses_the_unstable_plant_and_says_so():
     garbage = solve(thesis_regulator(unstable_plant(), 200), plain)
     assert not garbage.status.is_success
     conditions = [
-        plain.build(thesis_regulator(unstable_plant(), n)).prediction.condition for n in (20, 50)
+        plain.prepare(thesis_regulator(unstable_plant(), n)).prediction.condition for n in (20, 50)
     ]
     assert conditions[0] == pytest.approx(4e6, rel=0.1)
     assert 1e14 < conditions[1] < 1e15
-    assert Batch().build(thesis_regulator(unstable_plant(), 200)).prediction.condition < 100
+    assert Batch().prepare(thesis_regulator(unstable_plant(), 200)).prediction.condition < 100
 
 
 @pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
 def test_long_recursion_ends_at_the_algebraic_equation(plant):
     p = solve_discrete_are(plant.A, plant.B, 100 * np.eye(3), 500 * np.eye(1))
-    long = Riccati().build(thesis_regulator(plant, 200))
+    long = Riccati().prepare(thesis_regulator(plant, 200))
     assert np.abs(long.P[0] - p).max() <= 1e-9 * np.abs(p).max()
-    infinite = Riccati(horizon="infinite").build(thesis_regulator(plant, 5))
+    infinite = Riccati(horizon="infinite").prepare(thesis_regulator(plant, 5))
     for k in range(6):
         assert np.abs(infinite.P[k] - p).max() <= 1e-9 * np.abs(p).max()
     np.testing.assert_allclose(infinite.K[0], long.K[0], rtol=1e-9)

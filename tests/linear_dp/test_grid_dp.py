@@ -35,7 +35,7 @@ def test_scalar_against_the_riccati_recursion():
 def test_error_falls_with_the_square_of_the_cell():
     errors = []
     for n in (41, 81, 161):
-        table = GridDP(states=n, controls=81).build(scalar()).tabulate()
+        table = GridDP(states=n, controls=81).prepare(scalar()).tabulate()
         x = table.grid.axes[0].values
         near = np.abs(x) <= 1.0
         errors.append(np.mean(table.field[0] - scalar_cost(5) * x**2, where=near))
@@ -61,7 +61,7 @@ def test_unstable_mass_against_multiple_shooting():
 
 def test_reachable_sets_known_by_hand():
     # After j more steps of at most 1 the set is abs(x) <= 1 + j; every number is on the grid.
-    program = GridDP(states=25, controls=9).build(walk())
+    program = GridDP(states=25, controls=9).prepare(walk())
     table = program.tabulate()
     x = table.grid.axes[0].values
     for k in range(4):

@@ -236,10 +236,10 @@ def test_a_costate_is_normal_to_the_manifold_of_the_start() -> None:
         )
     )
     x, mu = np.array([0.6, 0.8]), np.array([-0.7])
-    normal = np.array(o.start(x, -2 * mu * x, mu, 0.0, P)).ravel()
+    normal = np.array(o.start(x, -2 * mu * x, mu, 0.0, P, x)).ravel()
     np.testing.assert_allclose(normal, 0.0, atol=ROUNDING)
     tangent = np.array([-x[1], x[0]])
-    tilted = np.array(o.start(x, -2 * mu * x + tangent, mu, 0.0, P)).ravel()
+    tilted = np.array(o.start(x, -2 * mu * x + tangent, mu, 0.0, P, x)).ravel()
     np.testing.assert_allclose(tilted, [0.0, *tangent], atol=ROUNDING)
 
 

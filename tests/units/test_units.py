@@ -248,7 +248,7 @@ def test_a_method_around_a_method_chooses_the_sizes() -> None:
     assert scaled(ocp) is None
     program = BetweenNodes().build(ocp)
     assert isinstance(program, BetweenNodesProgram)
-    assert isinstance(program.inner, MethodProgram)  # and no ScaledProgram
+    assert isinstance(program.inner, MethodProgram)  # and nothing around it
 
 
 def test_what_the_user_declares_is_the_size() -> None:

@@ -110,7 +110,7 @@ def _backwards(
         columns.append(answers @ by_u[:, k * m.nu : (k + 1) * m.nu])
         timed = timed + answers @ by_h[:, [k]]
         answers = answers @ by_x[:, k * m.nx : (k + 1) * m.nx]
-    columns += [timed] * ocp.has_free_time + [answers] * ocp.has_free_start
+    columns += [timed] * ocp.has_free_time + [answers[:, ocp.start_is_free]]
     return np.hstack(columns)
 
 

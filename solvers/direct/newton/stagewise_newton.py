@@ -14,6 +14,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    refuse_free_ends,
 )
 from solvers.direct.first_trajectory import OTHER_STATES, FirstStates
 from solvers.direct.newton.globalised_newton import GlobalisedNewton, NewtonOutcome
@@ -103,8 +104,7 @@ def _refuse(ocp: OCP) -> None:
         )
     if ocp.state_bounds.is_active:
         raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no state bounds")
-    if ocp.has_free_time:
-        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no free final time")
+    refuse_free_ends(ocp, "stagewise Newton")
 
 
 @dataclass(frozen=True, eq=False)

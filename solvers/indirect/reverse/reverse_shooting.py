@@ -26,7 +26,6 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
-    interruptible,
 )
 from solvers.indirect.newton_iteration import NewtonResult, Solve, newton
 from solvers.indirect.reverse.chart import Chart
@@ -94,8 +93,7 @@ class ReverseShooting(MethodSolver):
         check_positive(self.tolerance, "reverse shooting: tolerance")
         check_flag(self.damped, "reverse shooting: damped")
 
-    @interruptible
-    def build(self, ocp: OCP) -> "ReverseShootingProgram":
+    def prepare(self, ocp: OCP) -> "ReverseShootingProgram":
         """Derive the canonical flow and the conditions at both ends."""
         check_instance(ocp, OCP, "reverse shooting: the problem")
         refuse_what_reverse_cannot(ocp)

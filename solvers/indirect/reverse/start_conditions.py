@@ -18,6 +18,11 @@ def refuse_what_reverse_cannot(ocp: OCP) -> None:
         )
     if ocp.state_bounds.is_active:
         raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no state bounds")
+    if ocp.free_start:
+        raise UnsupportedProblem(
+            f"{ocp.name}: reverse integration takes a start that is given or on a manifold, not "
+            f"free in parts ('{ocp.free_start[0]}')"
+        )
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: reverse integration needs a fixed final time")
 

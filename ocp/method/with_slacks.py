@@ -1,0 +1,50 @@
+"""A problem with slack controls, and its solutions without them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ocp.method.rewriting import Rewriting, RewrittenGuess
+from ocp.problem.elastic import Elastic
+from ocp.problem.epigraph import Epigraph
+from ocp.problem.ocp import OCP
+from ocp.solution.solution import Solution
+from ocp.solution.solver import InitialGuess
+
+
+@dataclass(frozen=True, eq=False)
+class WithSlacks(Rewriting):
+    """The problem with more controls behind its own; the costs are those of this one.
+
+    Attributes:
+        extended: the problem without slacks, and how they follow from a trajectory.
+    """
+
+    extended: Epigraph | Elastic
+
+    @property
+    def original(self) -> OCP:
+        """The problem without slacks."""
+        return self.extended.original
+
+    @property
+    def problem(self) -> OCP:
+        """The problem with them."""
+        return self.extended.problem
+
+    def guess(self, given: InitialGuess) -> InitialGuess:
+        """Return a guess with the slacks that fit."""
+        m = self.original.model
+
+        def with_slacks(part: str, fractions: np.ndarray, values: np.ndarray) -> np.ndarray:
+            if part != "u":
+                return values
+            x = given.sample("x", fractions, m.nx)
+            return np.hstack([values, self.extended.slacks(fractions, x, values)])
+
+        return RewrittenGuess(given, with_slacks, {"x": m.nx, "u": m.nu, "costate": m.nx})
+
+    def answer(self, found: Solution) -> Solution:
+        """Return a solution without slacks."""
+        original = self.original
+        return found.with_(problem=original, u=found.u[:, : original.model.nu])

@@ -1,0 +1,1 @@
+"""What a user may write, in the simpler terms that every method takes."""

@@ -1,0 +1,155 @@
+"""A problem while it is rewritten: its own states and controls, and what is added behind them."""
+
+from dataclasses import dataclass, field, replace
+
+import casadi as ca
+import numpy as np
+
+from ocp.problem.constraint import Box, Constraint, unused
+from ocp.problem.model import Model
+from ocp.problem.ocp import OCP
+from ocp.problem.scaled import sizes_of
+
+
+@dataclass(frozen=True, eq=False)
+class AddedStates:
+    """States behind those of a problem.
+
+    Attributes:
+        symbol: (m,).
+        rate: of them (m,), or in discrete time the next ones.
+        start: where they start, or a guess of it (m,).
+        is_free: whether the optimiser chooses the start.
+        box: bounds of the start, each (m,).
+        size: typical sizes (m,).
+    """
+
+    symbol: ca.SX
+    rate: ca.SX
+    start: np.ndarray
+    is_free: bool
+    box: Box
+    size: np.ndarray
+
+    @classmethod
+    def constant(
+        cls,
+        ocp: OCP,
+        symbol: ca.SX,
+        value: np.ndarray,
+        *,
+        size: np.ndarray,
+        box: Box | None = None,
+    ) -> "AddedStates":
+        """Return states that never change: a constant that the optimiser chooses.
+
+        Its box holds at the start alone. At all nodes one bound would be many, and its multiplier
+        spread over them.
+        """
+        count = symbol.numel()
+        rate = symbol if ocp.model.is_discrete else ca.SX.zeros(count)
+        box = Box.unbounded(count) if box is None else box
+        return cls(symbol, rate, value, True, box, size)
+
+
+@dataclass(frozen=True, eq=False)
+class AddedControls:
+    """Controls behind those of a problem.
+
+    Attributes:
+        symbol: (m,).
+        box: their bounds, each (m,).
+        size: typical sizes (m,).
+    """
+
+    symbol: ca.SX
+    box: Box
+    size: np.ndarray
+
+
+@dataclass(eq=False)
+class Draft:
+    """A problem and its changes so far.
+
+    Attributes:
+        ocp: as it was written.
+        running_cost: of the rewritten problem.
+        terminal_cost: of it.
+        constraints: of it.
+        smoothness: of it.
+        states: added ones.
+        controls: added ones.
+    """
+
+    ocp: OCP
+    running_cost: ca.SX
+    terminal_cost: ca.SX
+    constraints: list[Constraint]
+    smoothness: int
+    states: list[AddedStates] = field(default_factory=list)
+    controls: list[AddedControls] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, ocp: OCP) -> "Draft":
+        """Begin with a problem as it was written."""
+        costs = ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)
+        return cls(ocp, *costs, list(ocp.constraints), ocp.smoothness)
+
+    def unused(self, name: str) -> str:
+        """Return a name that no constraint has."""
+        return unused(name, {c.name for c in (*self.constraints, *self.ocp.invariants)})
+
+    def add_states(self, added: AddedStates) -> slice:
+        """Add states, and return where they stand among all."""
+        first = self.ocp.model.nx + sum(s.symbol.numel() for s in self.states)
+        self.states.append(added)
+        return slice(first, first + added.symbol.numel())
+
+    def add_controls(self, added: AddedControls) -> slice:
+        """Add controls, and return where they stand among all."""
+        first = self.ocp.model.nu + sum(s.symbol.numel() for s in self.controls)
+        self.controls.append(added)
+        return slice(first, first + added.symbol.numel())
+
+    def problem(self) -> OCP:
+        """Return the rewritten problem."""
+        ocp, m = self.ocp, self.ocp.model
+        own = [name for name, free in zip(m.x_names, ocp.start_is_free, strict=True) if free]
+        added = [str(e) for s in self.states if s.is_free for e in ca.vertsplit(s.symbol)]
+        start, controls = ocp.start_bounds, ocp.control_bounds
+        for s in self.states:
+            start = start & s.box
+        for c in self.controls:
+            controls = controls & c.box
+        count = sum(s.symbol.numel() for s in self.states)
+        return replace(
+            ocp,
+            model=self._model(),
+            x0=np.concatenate([ocp.start(), *[s.start for s in self.states]]),
+            running_cost=self.running_cost,
+            terminal_cost=self.terminal_cost,
+            control_bounds=controls,
+            state_bounds=ocp.state_bounds & Box.unbounded(count),
+            constraints=tuple(self.constraints),
+            free_start=(*own, *added),
+            start_bounds=start,
+            unknowns=(),
+            smoothness=self.smoothness,
+            guess=None,
+        )
+
+    def _model(self) -> Model:
+        m, sizes = self.ocp.model, sizes_of(self.ocp)
+        states, controls = [s.symbol for s in self.states], [c.symbol for c in self.controls]
+        more_x, more_u = (sum(s.numel() for s in each) for each in (states, controls))
+        return replace(
+            m,
+            x=ca.vertcat(m.x, *states),
+            u=ca.vertcat(m.u, *controls),
+            f=ca.vertcat(m.f, *[s.rate for s in self.states]),
+            x_units=(*m.x_units, *[""] * more_x) if m.x_units else (),
+            u_units=(*m.u_units, *[""] * more_u) if m.u_units else (),
+            x_nominal=np.concatenate([sizes.x, *[s.size for s in self.states]]),
+            u_nominal=np.concatenate([sizes.u, *[c.size for c in self.controls]]),
+            start=ca.SX(),
+        )

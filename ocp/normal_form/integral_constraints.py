@@ -1,0 +1,45 @@
+r"""Bounds of integrals over the horizon, as bounds of states at the end.
+
+.. math:: \dot q = g(x, u, t), \quad q(t_0) = 0, \quad \underline q \le q(t_f) \le \overline q
+
+The costate of q never changes. It is the multiplier of the bounds: the price of the integral.
+"""
+
+import casadi as ca
+import numpy as np
+
+from ocp.normal_form.draft import AddedStates, Draft
+from ocp.problem.constraint import Box, Constraint
+
+
+def add_integrals(draft: Draft) -> dict[str, slice]:
+    """Replace every integral constraint; return where its state stands, by name."""
+    found: dict[str, slice] = {}
+    for i, c in enumerate(draft.constraints):
+        if c.at != "integral":
+            continue
+        each = [c.name] if c.size == 1 else [f"{c.name}_{k}" for k in range(c.size)]
+        total = ca.vertcat(*[ca.SX.sym(f"integral of {name}") for name in each])
+        found[c.name] = draft.add_states(
+            AddedStates(
+                symbol=total,
+                rate=c.expression,
+                start=np.zeros(c.size),
+                is_free=False,
+                box=Box.unbounded(c.size),
+                size=_size(c),
+            )
+        )
+        draft.constraints[i] = Constraint(
+            c.name, total, c.lower, c.upper, at="terminal", nominal=c.nominal
+        )
+    return found
+
+
+def _size(c: Constraint) -> np.ndarray:
+    """Return typical sizes of the integrals: those declared, or of their bounds."""
+    if c.nominal is not None:
+        return np.broadcast_to(np.asarray(c.nominal, dtype=float), c.size)
+    bounds = np.abs([np.asarray(c.lower), np.asarray(c.upper)])
+    largest = np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0)
+    return np.where(largest == 0.0, 1.0, largest)

@@ -1,0 +1,41 @@
+"""The normal form of a problem: what methods get, and where in it the user's terms stand."""
+
+from dataclasses import dataclass
+
+from ocp.normal_form.draft import Draft
+from ocp.normal_form.integral_constraints import add_integrals
+from ocp.normal_form.unknown_constants import add_start, add_unknowns
+from ocp.problem.cache import once_per_problem
+from ocp.problem.ocp import OCP
+from ocp.problem.portable import Portable
+
+
+@dataclass(frozen=True, eq=False)
+class NormalForm(Portable):
+    """A problem in simpler terms: more states and controls behind its own.
+
+    Attributes:
+        original: the problem as it was written.
+        problem: the one that methods get.
+        unknowns: where unknown constants stand among its states, by name.
+        integrals: where integrals stand among its states, by name of the constraint.
+        start: where the state at the start stands among its states.
+    """
+
+    original: OCP
+    problem: OCP
+    unknowns: dict[str, slice]
+    integrals: dict[str, slice]
+    start: slice
+
+
+@once_per_problem
+def normal_form(ocp: OCP) -> NormalForm | None:
+    """Return the normal form of a problem; None where it is written in simple terms already."""
+    if not (ocp.unknowns or ocp.at("integral") or ocp.refers_to_start):
+        return None
+    draft = Draft.of(ocp)
+    integrals = add_integrals(draft)
+    start = add_start(draft)
+    unknowns = add_unknowns(draft)
+    return NormalForm(ocp, draft.problem(), unknowns, integrals, start)

@@ -1,0 +1,49 @@
+"""The control along an extremal, for a problem as it is written.
+
+Its minimum principle is that of the normal form: there it has states and costates of which the
+problem itself knows nothing, such as the price of an integral.
+"""
+
+from typing import NamedTuple
+
+import casadi as ca
+
+from ocp.minimum_principle.necessary_conditions import minimum_principle, symbol_type
+from ocp.normal_form.normal_form import normal_form
+from ocp.problem.cache import once_per_problem
+from ocp.problem.ocp import OCP
+from ocp.solution.solution import Solution
+
+
+class ExtremalLaw(NamedTuple):
+    """What drives an extremal; z is state and costate in normal form, p that of the problem.
+
+    Attributes:
+        control: (z, t, p) -> the minimising control (nu,).
+        flow: (z, t, p) -> dz/dt.
+    """
+
+    control: ca.Function
+    flow: ca.Function
+
+
+@once_per_problem
+def extremal_law(ocp: OCP) -> ExtremalLaw:
+    """Derive it from the normal form."""
+    form = normal_form(ocp)
+    inner = ocp if form is None else form.problem
+    conditions, nx = minimum_principle(inner), inner.model.nx
+    kind = symbol_type(conditions.flow)
+    z, t, p = kind.sym("z", 2 * nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
+    own = p[: inner.p.numel()]  # parameters come first, behind them what is a state there
+    u = conditions.control(z[:nx], z[nx:], t, own)[: ocp.model.nu]
+    flow = conditions.flow(z, t, own)
+    return ExtremalLaw(
+        ca.Function("control", [z, t, p], [u], ["z", "t", "p"], ["u"]),
+        ca.Function("flow", [z, t, p], [flow], ["z", "t", "p"], ["rate"]),
+    )
+
+
+def extremal_of(solution: Solution) -> Solution:
+    """Return the solution whose states and costates drive an extremal."""
+    return solution if solution.normal is None else solution.normal
