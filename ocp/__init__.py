@@ -21,7 +21,7 @@ from ocp.mpc.mpc import MPC
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.record_file import records
 from ocp.mpc.record_format import Record
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
@@ -67,6 +67,7 @@ __all__ = [
     "Replay",
     "Rollout",
     "Signal",
+    "Soft",
     "Solution",
     "Solver",
     "SolverError",

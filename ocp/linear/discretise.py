@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.linear.structure import Terms, read_terms
+from ocp.problem.constraint import Constraint
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal
@@ -58,8 +59,16 @@ def discretise(ocp: OCP, dt: float) -> OCP:
         ),
         horizon=steps,
         running_cost=cost,
+        constraints=tuple(_priced(c, dt) for c in ocp.constraints),
         parameters=tuple(_resampled(entry, steps) for entry in ocp.parameters),
     )
+
+
+def _priced(c: Constraint, dt: float) -> Constraint:
+    """Return a constraint whose soft price is one a step."""
+    if c.soft is None or c.at != "path":
+        return c
+    return replace(c, soft=c.soft.per(1.0, 1.0 / dt))
 
 
 def _one_step(ocp: OCP, terms: Terms, dt: float) -> tuple[ca.SX, ca.SX]:

@@ -40,7 +40,7 @@ class InNormalForm(Rewriting):
         """Return the start with the guesses of what is added."""
         start = self.problem.start().copy()
         start[: len(data.x0)] = data.x0
-        start[self.form.start] = data.x0[: self.form.start.stop - self.form.start.start]
+        start[self.form.start] = self.form.copied(data.x0)
         return start
 
     def guess(self, given: InitialGuess) -> InitialGuess:
@@ -55,7 +55,9 @@ class InNormalForm(Rewriting):
         def with_more(part: str, fractions: np.ndarray, values: np.ndarray) -> np.ndarray:
             if part == "x":
                 return np.hstack([values, self._states(given, fractions, values)])
-            more = self.problem.model.nx - m.nx if part == "costate" else 0
+            if part == "u":
+                return np.hstack([values, self._slacks(given, fractions, values)])
+            more = self.problem.model.nx - m.nx
             return np.hstack([values, np.zeros((len(values), more))])
 
         return RewrittenGuess(given, with_more, widths)
@@ -90,7 +92,7 @@ class InNormalForm(Rewriting):
         """Return the added states that go with a guess of the own ones, (k, n)."""
         form, nx = self.form, self.original.model.nx
         whole = np.tile(self.problem.start(), (len(x), 1))
-        whole[:, form.start] = x[0]
+        whole[:, form.start] = form.copied(x[0])
         known = given.unknowns if isinstance(given, Guess | Solution) else {}
         for name, at in form.unknowns.items():
             if name in known:
@@ -105,6 +107,16 @@ class InNormalForm(Rewriting):
                     rates[:, at], fractions * duration, axis=0, initial=0.0
                 )
         return whole[:, nx:]
+
+    def _slacks(self, given: InitialGuess, fractions: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the slacks that go with guessed controls, (k, n)."""
+        if not self.form.slacks.numel():
+            return np.empty((len(u), 0))
+        ocp = self.original
+        x = given.sample("x", fractions, ocp.model.nx)
+        x = np.tile(ocp.start(), (len(u), 1)) if x is None else x
+        p, t = ocp.parameter_values().at(fractions), fractions[None, :] * ocp.duration
+        return np.array(self.form.slack.map(len(u))(x.T, u.T, t, p.T)).T
 
     def _rates(
         self, x: np.ndarray, u: np.ndarray, fractions: np.ndarray, duration: float

@@ -81,6 +81,57 @@ class Box(Portable):
 
 
 @dataclass(frozen=True, eq=False)
+class Soft(Portable):
+    """The price of what exceeds a constraint.
+
+    For an excess e of each row, linear * e + quadratic * e^2: along the way per second (per step in
+    discrete time), at the end once. A linear price above the multiplier of the hard constraint is
+    exact: the constraint is then met wherever it can be. One that is only quadratic always gives
+    way a little.
+
+    Args:
+        linear: price per unit of the row, a number or (m,).
+        quadratic: price per unit squared, a number or (m,).
+
+    Raises:
+        ProblemError: if a price is negative, or a row has none.
+    """
+
+    linear: ArrayLike = 0.0
+    quadratic: ArrayLike = 0.0
+
+    def sized(self, size: int, what: str) -> "Soft":
+        """Return the prices (size,) of each row, checked."""
+        each = {
+            name: check_numbers(value, size, f"{what}: soft, {name} price")
+            for name, value in (("linear", self.linear), ("quadratic", self.quadratic))
+        }
+        for name, values in each.items():
+            if (values < 0.0).any():
+                raise ProblemError(f"{what}: soft, {name} price = {values}: it must be 0 or more")
+        free = np.flatnonzero(each["linear"] + each["quadratic"] == 0.0)
+        if free.size:
+            raise ProblemError(
+                f"{what}: row {free[0]} is soft at no price: give one, or leave the row out"
+            )
+        return Soft(**each)
+
+    def cost(self, excess: ca.SX) -> ca.SX:
+        """Return what an excess (m,) of all rows costs."""
+        linear, quadratic = (ca.DM(np.asarray(v, float)) for v in (self.linear, self.quadratic))
+        return ca.dot(linear, excess) + ca.dot(quadratic, excess**2)
+
+    def rows(self, index: list[int]) -> "Soft":
+        """Return the prices of some rows."""
+        return Soft(np.asarray(self.linear)[index], np.asarray(self.quadratic)[index])
+
+    def per(self, size: np.ndarray | float, cost: float) -> "Soft":
+        """Return the prices where rows are measured in sizes, and cost in one of its own."""
+        linear, quadratic = np.asarray(self.linear), np.asarray(self.quadratic)
+        return Soft(linear * size / cost, quadratic * np.square(size) / cost)
+
+
+@dataclass(frozen=True, eq=False)
 class Constraint(Portable):
     """``lower <= expression <= upper`` at a place of the trajectory.
 
@@ -97,6 +148,7 @@ class Constraint(Portable):
         limits_input: whether the rows limit what an actuator is sent, so that whatever acts has to
             meet them and no penalty makes them soft; None: where they contain controls and no
             states. With a state that holds the actuator's position, say so.
+        soft: what it costs to exceed the bounds; None: they are hard.
 
     Raises:
         ProblemError: naming the constraint and what is wrong with place, expression or bounds.
@@ -109,6 +161,7 @@ class Constraint(Portable):
     at: Place = "path"
     nominal: ArrayLike | None = None
     limits_input: bool | None = None
+    soft: Soft | None = None
 
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
@@ -129,10 +182,25 @@ class Constraint(Portable):
         object.__setattr__(self, "nominal", nominal)
         if self.limits_input is not None:
             check_flag(self.limits_input, f"constraint '{self.name}': limits_input")
+        self._check_soft()
         if self.limits_input and self.at != "path":
             raise ProblemError(
                 f"constraint '{self.name}' limits an input: it has to hold at='path'"
             )
+
+    def _check_soft(self) -> None:
+        if self.soft is None:
+            return
+        what = f"constraint '{self.name}'"
+        check_instance(self.soft, Soft, f"{what}: soft")
+        if self.at not in ("path", "terminal"):
+            raise ProblemError(
+                f"{what}: soft constraints hold at='path' or at='terminal'; write the price of "
+                f"this one into a cost"
+            )
+        if self.limits_input:
+            raise ProblemError(f"{what} limits an input: no price makes it soft")
+        object.__setattr__(self, "soft", self.soft.sized(self.size, what))
 
     @property
     def size(self) -> int:

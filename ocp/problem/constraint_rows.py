@@ -109,22 +109,22 @@ class ConstraintRows:
         label = "constraint" if place == "path" else f"{place} constraint"
         on_x, on_u = (_depends(expression, symbols) for symbols in (model.x, model.u))
         parts = (
-            (c.name, c.limits_input, low, high)
+            (c, low, high)
             for c in constraints
             for low, high in zip(np.asarray(c.lower), np.asarray(c.upper), strict=True)
         )
         rows = tuple(
             ConstraintRow(
-                name=name,
+                name=c.name,
                 place=place,
                 node=0,
-                lower=float(low),
-                upper=float(high),
-                kind="input" if limits or (limits is None and u and not x) else "hard",
+                lower=float(low) if c.soft is None else -np.inf,
+                upper=float(high) if c.soft is None else np.inf,
+                kind=_kind(c, on_state=bool(x), on_control=bool(u)),
                 on_control=bool(u),
-                label=f"{label} '{name}'",
+                label=f"{label} '{c.name}'",
             )
-            for (name, limits, low, high), x, u in zip(parts, on_x, on_u, strict=True)
+            for (c, low, high), x, u in zip(parts, on_x, on_u, strict=True)
         )
         return cls(rows, expression)
 
@@ -291,6 +291,13 @@ class ImposedRows:
     no_control_rows: np.ndarray | None = None
     no_state_rows: np.ndarray | None = None
     sizes: RowSizes | None = None
+
+
+def _kind(c: Constraint, *, on_state: bool, on_control: bool) -> RowKind:
+    if c.soft is not None:
+        return "soft"
+    limits = on_control and not on_state if c.limits_input is None else c.limits_input
+    return "input" if limits else "hard"
 
 
 def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:

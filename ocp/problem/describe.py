@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
-from ocp.problem.constraint import Box, Constraint
+from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.model import Model
 from ocp.problem.parameters import Parameter, Signal, Unknown
 
@@ -138,7 +138,14 @@ def _bounds(box: Box, names: tuple[str, ...], units: tuple[str, ...]) -> Iterabl
 def _constraint(c: Constraint, where: str) -> Iterable[str]:
     lower, upper = np.asarray(c.lower), np.asarray(c.upper)
     for i, row in enumerate(ca.vertsplit(c.expression)):
-        yield f"    {_between(lower[i], readable(row), upper[i])}   ({c.name}, {where})"
+        said = f"{c.name}, {where}" if c.soft is None else f"{c.name}, {where}, {_soft(c.soft, i)}"
+        yield f"    {_between(lower[i], readable(row), upper[i])}   ({said})"
+
+
+def _soft(soft: Soft, row: int) -> str:
+    linear, quadratic = (float(np.asarray(v)[row]) for v in (soft.linear, soft.quadratic))
+    parts = [f"{linear:g} e"] * (linear > 0.0) + [f"{quadratic:g} e^2"] * (quadratic > 0.0)
+    return "soft at " + " + ".join(parts)
 
 
 def _between(lower: float, middle: str, upper: float) -> str:

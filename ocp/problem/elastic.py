@@ -55,7 +55,7 @@ class Elastic(Portable):
         above = np.flatnonzero(np.isfinite(upper)).tolist()
         below = np.flatnonzero(np.isfinite(lower)).tolist()
         scaled = rows.expression / ca.DM(unit)
-        kept = [*ocp.at("initial")]
+        kept = [c for c in ocp.constraints if c.at == "initial" or c.soft is not None]
         names = {c.name for c in (*kept, *ocp.invariants)}
         inputs = ocp.rows.path.of_kind("input")
         for name, expression, low, high, limits_input in (

@@ -28,6 +28,7 @@ from ocp.problem.parameters import (
     Unknown,
 )
 from ocp.problem.portable import Portable
+from ocp.problem.soft import price
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
 _ROUNDING = 1e-9
@@ -217,12 +218,12 @@ class OCP(Portable):
 
     @cached_property
     def functions(self) -> Functions:
-        """Dynamics, costs and constraints as CasADi Functions, built at first use."""
+        """Dynamics, costs with soft prices, and constraints as Functions, built at first use."""
         return Functions.of(
             self.model,
             self.p,
-            running_cost=ca.SX(self.running_cost),
-            terminal_cost=ca.SX(self.terminal_cost),
+            running_cost=ca.SX(self.running_cost) + price(self.at("path")),
+            terminal_cost=ca.SX(self.terminal_cost) + price(self.at("terminal")),
             constraints=self.constraints,
             invariants=self.invariants,
         )

@@ -76,7 +76,9 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         terminal_cost=in_sizes(ocp.terminal_cost, rounded.cost),
         control_bounds=_box(ocp.control_bounds, rounded.u),
         state_bounds=_box(ocp.state_bounds, rounded.x),
-        constraints=tuple(_constraint(c, in_sizes, rounded.rows[c.name]) for c in ocp.constraints),
+        constraints=tuple(
+            _constraint(c, in_sizes, rounded.rows[c.name], rounded.cost) for c in ocp.constraints
+        ),
         free_start=ocp.free_start,
         start_bounds=_box(ocp.start_bounds, rounded.x),
         parameters=ocp.parameters,
@@ -149,7 +151,7 @@ def _with_units(rows: ConstraintRows, sizes: np.ndarray) -> ConstraintRows:
     return ConstraintRows(tuple(each), rows.expression)
 
 
-def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray) -> Constraint:
+def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray, cost: float) -> Constraint:
     return Constraint(
         c.name,
         in_sizes(c.expression, sizes),
@@ -157,6 +159,7 @@ def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray) -> Constrai
         np.asarray(c.upper) / sizes,
         at=c.at,
         limits_input=c.limits_input,
+        soft=None if c.soft is None else c.soft.per(sizes, cost),
     )
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
@@ -21,6 +22,7 @@ from ocp.problem.ocp import OCP
 from ocp.problem.portable import without_caches
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
+from ocp.problem.soft import excess
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.status import Status
 
@@ -207,6 +209,25 @@ class Solution:
             return {}
         form, costate = normal_form(self.problem), self.normal.costate[-1]
         return {} if form is None else {name: costate[at] for name, at in form.integrals.items()}
+
+    @property
+    def slack(self) -> dict[str, np.ndarray]:
+        """Excess of soft constraints by name, (N, m) at all nodes but the last, (m,) at the end."""
+        ocp, before = self.problem, slice(0, len(self.t) - 1)
+        p, u = self.data.values.at(self.fractions[before]), self.control(self.t[before])
+        found = {}
+        for c in ocp.constraints:
+            if c.soft is None:
+                continue
+            m, outside = ocp.model, ca.fabs(excess(c))
+            function = ca.Function("excess", [m.x, m.u, m.t, ocp.p], [ca.densify(outside)])
+            if c.at == "path":
+                along = self.x[before].T, u.T, self.t[None, before], p.T
+                found[c.name] = np.array(function.map(len(u))(*along)).T
+            else:
+                end = self.x[-1], np.zeros(m.nu), self.t[-1], self.data.values.at(1.0)[0]
+                found[c.name] = np.array(function(*end)).ravel()
+        return found
 
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
