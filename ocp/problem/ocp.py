@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
+from ocp.checks.expressions import check_scalar
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
 from ocp.problem.describe import describe
@@ -28,10 +28,14 @@ from ocp.problem.parameters import (
     Unknown,
 )
 from ocp.problem.portable import Portable
+from ocp.problem.problem_checks import (
+    check_distinct,
+    check_free_start,
+    check_start_inside,
+    check_symbols,
+    check_used,
+)
 from ocp.problem.soft import price
-
-# A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -129,10 +133,8 @@ class OCP(Portable):
         )
         set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
         set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
-        self._check_names()
         self._check_horizon()
-        self._check_free_start()
-        self._check_symbols()
+        self._check_terms()
         self._check_start()
 
     # -- what it is ---------------------------------------------------------------
@@ -357,16 +359,6 @@ class OCP(Portable):
             check_instance(name, str, f"{self.name}: an entry of free_start")
         object.__setattr__(self, "free_start", tuple(self.free_start))
 
-    def _check_names(self) -> None:
-        for kind, entries in (
-            ("constraint", (*self.constraints, *self.invariants)),
-            ("parameter", (*self.parameters, *self.unknowns)),
-        ):
-            names = [entry.name for entry in entries]
-            twice = sorted({n for n in names if names.count(n) > 1})
-            if twice:
-                raise ProblemError(f"{self.name}: two {kind}s are called '{twice[0]}'")
-
     def _check_horizon(self) -> None:
         if not isinstance(self.smoothness, int) or self.smoothness not in (0, 1, 2):
             raise ProblemError(f"{self.name}: smoothness = {self.smoothness!r}, it is 0, 1 or 2")
@@ -381,67 +373,23 @@ class OCP(Portable):
                 "a number of steps, a whole one, and no duration"
             )
 
-    def _check_free_start(self) -> None:
-        names = self.model.x_names
-        for name in self.free_start:
-            if name not in names:
-                raise ProblemError(
-                    f"{self.name}: free_start: '{name}' is no state; they are {', '.join(names)}"
-                )
-        bounded = np.isfinite(self.start_bounds.lower) | np.isfinite(self.start_bounds.upper)
-        for i in np.flatnonzero(bounded & ~self.start_is_free):
-            raise ProblemError(
-                f"{self.name}: start_bounds[{i}]: the start of {names[i]} is given; name it in "
-                "free_start"
-            )
-        self.start_box.sized(self.model.nx, f"{self.name}: bounds of the start")
-
-    def _check_symbols(self) -> None:
-        model, p = self.model, self.p
-        declared = element_names(ca.vertcat(model.x, model.u, model.t, p))
-        hashes = {e.element_hash() for e in ca.vertsplit(ca.vertcat(model.x, model.u, model.t, p))}
-        if len(hashes) < len(declared):
-            raise ProblemError(
-                f"{self.name}: a symbol is declared twice among x, u, t and parameters"
-            )
-        model.refuse_foreign_symbols(p)
-        everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
-        refuse_foreign_symbols(ca.SX(self.running_cost), everywhere, f"{self.name}: running_cost")
-        refuse_foreign_symbols(ca.SX(self.terminal_cost), at_ends, f"{self.name}: terminal_cost")
-        for c in self.constraints:
-            allowed = everywhere if c.at in ("path", "integral") else at_ends
-            refuse_foreign_symbols(
-                c.expression, allowed, f"{self.name}: {c.at} constraint '{c.name}'"
-            )
-        self._check_used()
-        for c in self.invariants:
-            refuse_foreign_symbols(c.expression, at_ends, f"{self.name}: invariant '{c.name}'")
-            if c.at != "path":
-                raise ProblemError(f"{self.name}: invariant '{c.name}' must hold at='path'")
-
-    def _check_used(self) -> None:
-        """Refuse an unknown constant that nothing depends on, and integrals of steps."""
-        terms = [self.model.f, ca.SX(self.running_cost), ca.SX(self.terminal_cost)]
-        used = ca.symvar(ca.veccat(*terms, *[c.expression for c in self.constraints]))
-        hashes = {symbol.element_hash() for symbol in used}
-        for entry in self.unknowns:
-            for symbol in ca.vertsplit(entry.symbol):
-                if symbol.element_hash() not in hashes:
-                    raise ProblemError(
-                        f"{self.name}: unknown constant '{entry.name}' ({symbol}) appears in no "
-                        "dynamics, cost or constraint: nothing decides its value"
-                    )
-        for c in self.at("integral"):
-            if self.model.is_discrete:
-                raise ProblemError(
-                    f"{self.name}: integral constraint '{c.name}': the model is discrete in time; "
-                    "carry the sum as a state s[k+1] = s[k] + ... with a bound at the end"
-                )
+    def _check_terms(self) -> None:
+        name, model = self.name, self.model
+        check_distinct(name, "constraint", [c.name for c in (*self.constraints, *self.invariants)])
+        check_distinct(name, "parameter", [e.name for e in (*self.parameters, *self.unknowns)])
+        free = self.start_is_free
+        check_free_start(name, model.x_names, self.free_start, self.start_bounds, free)
+        self.start_box.sized(model.nx, f"{name}: bounds of the start")
+        costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
+        check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
+        terms = [model.f, *costs, *[c.expression for c in self.constraints]]
+        check_used(name, self.unknowns, terms)
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
         model, x0 = self.model, self.start()
-        self._check_start_bounds(x0)
+        given = ~self.start_is_free
+        check_start_inside(self.name, model.x_names, x0, self.state_bounds, given)
         if self.guess is not None:
             for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
                 self.guess.sample(part, np.array([0.0]), width)
@@ -455,17 +403,3 @@ class OCP(Portable):
         given = self.guess.sample("u", np.array([0.0]), self.model.nu) if self.guess else None
         zero = self.control_bounds.clip(np.zeros(self.model.nu))
         return [inside(self.control_bounds) if given is None else given[0], zero]
-
-    def _check_start_bounds(self, x0: np.ndarray) -> None:
-        excess = self.state_bounds.excess(x0)
-        outside = np.flatnonzero(excess > _ROUNDING * (1.0 + np.abs(x0)))
-        outside = outside[~self.start_is_free[outside]]
-        if outside.size:
-            i = int(outside[0])
-            low, high = (
-                np.asarray(b)[i] for b in (self.state_bounds.lower, self.state_bounds.upper)
-            )
-            raise ProblemError(
-                f"{self.name}: x0[{i}] ({self.model.x_names[i]}) = {x0[i]} is outside "
-                f"its bounds [{low}, {high}]"
-            )
