@@ -10,6 +10,7 @@ import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
 from ocp.problem.constraint import Box, Constraint
+from ocp.problem.scaled import sizes_of
 
 
 def add_integrals(draft: Draft) -> dict[str, slice]:
@@ -27,19 +28,10 @@ def add_integrals(draft: Draft) -> dict[str, slice]:
                 start=np.zeros(c.size),
                 is_free=False,
                 box=Box.unbounded(c.size),
-                size=_size(c),
+                size=sizes_of(draft.ocp).rows[c.name],
             )
         )
         draft.constraints[i] = Constraint(
             c.name, total, c.lower, c.upper, at="terminal", nominal=c.nominal
         )
     return found
-
-
-def _size(c: Constraint) -> np.ndarray:
-    """Return typical sizes of the integrals: those declared, or of their bounds."""
-    if c.nominal is not None:
-        return np.broadcast_to(np.asarray(c.nominal, dtype=float), c.size)
-    bounds = np.abs([np.asarray(c.lower), np.asarray(c.upper)])
-    largest = np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0)
-    return np.where(largest == 0.0, 1.0, largest)

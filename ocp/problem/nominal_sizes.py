@@ -33,6 +33,8 @@ _ROUNDING = 1e-9
 # What changes by more than this part of itself with a tick of the clock, a part of the horizon, is
 # decided by rounding.
 _UNSTEADY, _TICK = 0.5, 1e-12
+# A limit so many sizes away, in logarithms, says nothing of them.
+_FAR = float(np.log(1e4))
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
@@ -85,12 +87,17 @@ class _Point(NamedTuple):
 
 
 class _Equation(NamedTuple):
-    """weight * (sum of log sizes at ``plus`` - those at ``minus`` - ``value``) = 0."""
+    """weight * (sum of log sizes at ``plus`` - those at ``minus`` - ``value``) = 0.
+
+    One of a limit, which may be written far away to mean that there is none, is left out where
+    everything else says that nothing comes near it.
+    """
 
     weight: float
     plus: tuple[int, ...]
     minus: tuple[int, ...]
     value: float
+    is_limit: bool = False
 
 
 def nominal_sizes(ocp: OCP) -> Sizes:
@@ -166,10 +173,11 @@ class _Functions:
         later = point._replace(t=point.t + _TICK * self.horizon)
         each = zip(function(*point), function(*later), strict=True)
         both = ((np.array(here), np.array(there)) for here, there in each)
-        return [
-            np.where(np.abs(there - here) > _UNSTEADY * np.abs(here), 0.0, here)
-            for here, there in both
-        ]
+        with np.errstate(invalid="ignore"):  # what is not finite stays so, and is left out later
+            return [
+                np.where(np.abs(there - here) > _UNSTEADY * np.abs(here), 0.0, here)
+                for here, there in both
+            ]
 
     def equations(self, point: _Point) -> Iterator[_Equation]:
         """Yield what dynamics and constraints at a point say of the sizes."""
@@ -181,7 +189,8 @@ class _Functions:
             for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
                 if offset[i] > 0.0:
                     size = float(np.log(offset[i]) - np.log(abs(jacobian[i, j])))
-                    yield _Equation(_ROW, (int(j),), (), size)
+                    is_limit = bool(np.ravel(c.lower)[i] != np.ravel(c.upper)[i])
+                    yield _Equation(_ROW, (int(j),), (), size, is_limit)
 
     def rate_sizes(self, point: _Point) -> Iterator[_Equation]:
         """Yield what the rate at a point says of the sizes by itself."""
@@ -292,7 +301,8 @@ def _given(ocp: OCP) -> Iterator[_Equation]:
     for weight, first, samples in rows:
         largest = np.abs(samples).max(axis=0)
         for j in np.flatnonzero(_usable(largest)).tolist():
-            yield _Equation(weight, (first + j,), (), float(np.log(largest[j])))
+            size = float(np.log(largest[j]))
+            yield _Equation(weight, (first + j,), (), size, weight == _BOUND)
 
 
 def _distance(c: Constraint, value: np.ndarray) -> np.ndarray:
@@ -323,13 +333,32 @@ def _usable(values: np.ndarray) -> np.ndarray:
 
 def _solved(equations: Iterable[_Equation], size: int) -> np.ndarray:
     """Return the logarithms by least squares, 0 for what nothing is known of."""
-    matrix, right = [], []
-    for weight, plus, minus, value in equations:
-        row = np.zeros(size)
-        np.add.at(row, list(plus), weight)
-        np.subtract.at(row, list(minus), weight)
-        matrix.append(row)
-        right.append(weight * value)
-    if not matrix:
+    every = list(equations)
+    others = [e for e in every if not e.is_limit]
+    if len(others) == len(every) or not others:
+        return _least_squares(every, size)
+    matrix = np.array([_row(e, size) for e in others])
+    # What the others determine is left where it is by the projection on their rows.
+    known = np.abs(np.diag(np.linalg.pinv(matrix, rcond=1e-9) @ matrix) - 1.0) < 1e-6
+    logs = _least_squares(others, size)
+
+    def is_near(e: _Equation) -> bool:
+        apart = e.value - logs[list(e.plus)].sum() + logs[list(e.minus)].sum()
+        return apart < _FAR or not known[[*e.plus, *e.minus]].all()
+
+    return _least_squares([e for e in every if not e.is_limit or is_near(e)], size)
+
+
+def _least_squares(equations: list[_Equation], size: int) -> np.ndarray:
+    if not equations:
         return np.zeros(size)
-    return np.linalg.lstsq(np.array(matrix), np.array(right), rcond=1e-9)[0]
+    matrix = np.array([_row(e, size) for e in equations])
+    right = np.array([e.weight * e.value for e in equations])
+    return np.linalg.lstsq(matrix, right, rcond=1e-9)[0]
+
+
+def _row(equation: _Equation, size: int) -> np.ndarray:
+    row = np.zeros(size)
+    np.add.at(row, list(equation.plus), equation.weight)
+    np.subtract.at(row, list(equation.minus), equation.weight)
+    return row

@@ -1,0 +1,163 @@
+"""Every library problem posed again in the terms of the normal form, and solved to the same answer.
+
+The same transcription has to give the same number; names and shapes are those of the problem.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from benchmarks.cases.case import Case
+from benchmarks.cases.library.every import LIBRARY
+from ocp import OCP, Box, Constraint, FreeTime, Guess, Soft, Solution, Unknown, evaluate, solve
+from ocp.internal import normal_form
+from solvers import Collocation, MultipleShooting
+
+# Costs agree to this, relative to 1 + cost: interior points relax bounds by 1e-8.
+ALIKE = 1e-6
+INTERVALS = 40
+# Costs of problems whose optimum is so flat that a solver stops anywhere near it.
+FLAT = {"fuller": 1e-4, "pendulum-minimum-time": 1e-3}
+
+Pose = Callable[[OCP], OCP | None]
+
+
+def with_free_start(ocp: OCP) -> OCP | None:
+    """A given start as one that is free between equal bounds."""
+    if ocp.has_free_start:
+        return None
+    x0 = ocp.start()
+    return replace(ocp, free_start=ocp.model.x_names, start_bounds=Box(x0, x0))
+
+
+def with_unknown_parameters(ocp: OCP) -> OCP | None:
+    """Every parameter as an unknown constant between equal bounds."""
+    constants = [e for e in ocp.parameters if e.symbol.numel() == np.size(e.value)]
+    if not constants:
+        return None
+    kept = tuple(e for e in ocp.parameters if e not in constants)
+    unknowns = tuple(Unknown(e.name, e.symbol, e.value, e.value, e.value) for e in constants)
+    return replace(ocp, parameters=kept, unknowns=unknowns)
+
+
+def with_unknown_time(ocp: OCP) -> OCP | None:
+    """A free final time as an unknown constant, over a horizon of 1."""
+    horizon, m = ocp.horizon, ocp.model
+    if not isinstance(horizon, FreeTime):
+        return None
+    total = ca.SX.sym("total")
+
+    def stretched(expression: ca.SX | float) -> ca.SX:
+        return ca.substitute(ca.SX(expression), m.t, total * m.t)
+
+    return replace(
+        ocp,
+        model=replace(m, f=total * stretched(m.f)),
+        horizon=1.0,
+        running_cost=total * stretched(ocp.running_cost),
+        terminal_cost=stretched(ocp.terminal_cost),
+        constraints=tuple(replace(c, expression=stretched(c.expression)) for c in ocp.constraints),
+        unknowns=(Unknown("total", total, horizon.guess, horizon.lower, horizon.upper),),
+    )
+
+
+def with_coupled_ends(ocp: OCP) -> OCP | None:
+    """What terminal constraints ask, relative to the start."""
+    ends, m = ocp.at("terminal"), ocp.model
+    if not ends or ocp.has_free_start:
+        return None
+
+    def relative(c: Constraint) -> Constraint:
+        if c.at != "terminal":
+            return c
+        at_start = ca.substitute(c.expression, m.x, m.start)
+        if not ca.depends_on(at_start, m.start) or ca.depends_on(at_start, m.t):
+            return c
+        value = np.array(ca.Function("c", [m.start, m.t, ocp.p], [at_start])(
+            ocp.start(), ocp.duration, ocp.parameter_values().at(0.0)[0]
+        )).ravel()  # fmt: skip
+        if not np.isfinite(value).all():
+            return c
+        return replace(
+            c, expression=c.expression - at_start, lower=c.lower - value, upper=c.upper - value
+        )
+
+    posed = replace(ocp, constraints=tuple(relative(c) for c in ocp.constraints))
+    return posed if posed.refers_to_start else None
+
+
+def with_an_idle_integral(ocp: OCP) -> OCP | None:
+    """An integral that is bounded far away."""
+    if ocp.model.is_discrete or not ocp.model.nu:
+        return None
+    square = ca.sumsqr(ocp.model.u)
+    idle = Constraint("spent", square / (1 + square), upper=1e9, at="integral", nominal=1e3)
+    return replace(ocp, constraints=(*ocp.constraints, idle))
+
+
+def with_soft_ends(ocp: OCP) -> OCP | None:
+    """Terminal constraints at a price above their multipliers."""
+    ends = ocp.at("terminal")
+    if not ends:
+        return None
+    plain = solve(ocp, MultipleShooting(INTERVALS))
+    price = 3.0 * (1.0 + float(np.abs(plain.costate).max()))
+    soft = tuple(replace(c, soft=Soft(price)) if c.at == "terminal" else c for c in ocp.constraints)
+    return replace(ocp, constraints=soft)
+
+
+POSED: dict[str, Pose] = {
+    "free start": with_free_start,
+    "unknown parameters": with_unknown_parameters,
+    "unknown time": with_unknown_time,
+    "coupled ends": with_coupled_ends,
+    "integral": with_an_idle_integral,
+    "soft ends": with_soft_ends,
+}
+
+
+def _agree(plain: Solution, posed: Solution, within: float) -> None:
+    size = 1.0 + abs(plain.cost)
+    assert abs(posed.cost - plain.cost) <= within * size
+    assert posed.x.shape == plain.x.shape
+    assert posed.u.shape == plain.u.shape
+    if any(c.soft or c.at == "integral" for c in posed.problem.constraints):
+        # To miss an end by the error of the integrator has a price here, and the integral has an
+        # error of its own.
+        return
+    assert posed.status.is_success, posed.message
+    assert abs(evaluate(posed).cost - evaluate(plain).cost) <= 10 * within * size
+
+
+def _guess(plain: Solution, posed: OCP) -> Guess:
+    """The plain answer, so that of several optima it is the same one."""
+    m, at = posed.model, np.linspace(0.0, 1.0, 101)
+    known = {"total": plain.duration} if any(e.name == "total" for e in posed.unknowns) else {}
+    return Guess(
+        x=plain.sample("x", at, m.nx),
+        u=plain.sample("u", at, m.nu),
+        duration=plain.duration,
+        unknowns=known,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
+@pytest.mark.parametrize("how", POSED)
+def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Case) -> None:
+    pose = POSED[how]
+    ocp = case.build()
+    posed = pose(ocp)
+    if posed is None:
+        pytest.skip("it has no such term")
+    assert (normal_form(posed) is None) == (how == "free start")
+    for solver in (MultipleShooting(INTERVALS), Collocation(16)):
+        if ocp.model.is_discrete and isinstance(solver, Collocation):
+            continue
+        plain = solve(ocp, solver)
+        if plain.status.is_success:
+            found = solve(posed, solver, guess=_guess(plain, posed))
+            _agree(plain, found, FLAT.get(case.name, ALIKE))
