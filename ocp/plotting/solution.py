@@ -1,8 +1,10 @@
 """Figure of a solution: states, controls, costates and constraints over time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from functools import reduce
+from operator import and_
 from typing import Protocol
 
 import casadi as ca
@@ -163,7 +165,9 @@ def _costates(solution: PlottableSolution) -> _Panel:
 def _path(solution: PlottableSolution) -> _Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), solution.control(t), t[:, None], _parameters(solution, t)]
-    return _constraints("path constraints", ocp.rows.path, ocp.functions.path, given, t)
+    panel = _constraints("path constraints", ocp.rows.path, ocp.functions.path, given, t)
+    limits = [c.box for c in ocp.at("path")]  # also of soft ones, whose rows have none
+    return replace(panel, box=reduce(and_, limits)) if limits else panel
 
 
 def _invariants(solution: PlottableSolution) -> _Panel:
