@@ -84,6 +84,8 @@ def multistart(
 def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> list[Guess]:
     """Return smooth random controls: a constant and half a cosine wave for each control.
 
+    Unknown constants are drawn as well.
+
     Args:
         ocp: the problem.
         number: how many.
@@ -102,7 +104,21 @@ def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> 
     scale = np.where(np.isfinite(half_range), np.minimum(half_range, amplitude), amplitude)
     waves = np.stack([np.ones(51), np.cos(np.pi * np.linspace(0.0, 1.0, 51))])
     shapes = rng.normal(size=(number, 2, nu)) * scale
-    return [Guess(u=waves.T @ shape) for shape in shapes]
+    return [Guess(u=waves.T @ shape, unknowns=_random_unknowns(ocp, rng)) for shape in shapes]
+
+
+def _random_unknowns(ocp: OCP, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Return values of the unknown constants: between two bounds, else around the guess."""
+    found = {}
+    for entry in ocp.unknowns:
+        low, high = np.asarray(entry.lower), np.asarray(entry.upper)
+        bounded = np.isfinite(low) & np.isfinite(high)
+        around = entry.value + rng.normal(size=entry.value.shape) * (1.0 + np.abs(entry.value))
+        inside = np.where(bounded, low, 0.0) + rng.uniform(size=low.shape) * np.where(
+            bounded, high - low, 0.0
+        )
+        found[entry.name] = entry.box.clip(np.where(bounded, inside, around))
+    return found
 
 
 def _is_same(one: LocalOptimum, other: LocalOptimum) -> bool:

@@ -58,6 +58,11 @@ class Plant:
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_instance(self.ocp, OCP, "plant: ocp")
+        for entry in self.ocp.unknowns:
+            raise ProblemError(
+                f"plant: '{entry.name}' of {self.ocp.name} is an unknown constant; a plant needs "
+                "its value, as a Parameter"
+            )
         check_whole(self.substeps, "plant: substeps")
         for name in ("disturbance", "parameters"):
             if getattr(self, name) is not None:

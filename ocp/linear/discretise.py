@@ -10,7 +10,6 @@ from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.linear.structure import Terms, read_terms
 from ocp.problem.constraint import Constraint
-from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal
 
@@ -54,9 +53,7 @@ def discretise(ocp: OCP, dt: float) -> OCP:
     return replace(
         ocp,
         name=f"{ocp.name}, dt = {dt:g} s",
-        model=Model(
-            name=m.name, x=m.x, u=m.u, f=after, t=m.t, dt=dt, x_units=m.x_units, u_units=m.u_units
-        ),
+        model=replace(m, f=after, dt=dt),
         horizon=steps,
         running_cost=cost,
         constraints=tuple(_priced(c, dt) for c in ocp.constraints),

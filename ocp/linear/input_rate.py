@@ -47,8 +47,11 @@ def with_input_rate(
     change = ca.vertcat(*[ca.SX.sym(f"change of {name}") for name in m.u_names])
     now = before + change
 
+    model = _model(m, before, change)
+
     def moved(expression: ca.SX | float) -> ca.SX:
-        return ca.substitute(ca.SX(expression), m.u, now)
+        written = ca.vertcat(m.u, m.start)
+        return ca.substitute(ca.SX(expression), written, ca.vertcat(now, model.start[: m.nx]))
 
     constraints = [part for c in ocp.constraints for part in _parts(ocp, c)]
     constraints = [replace(c, expression=moved(c.expression)) for c in constraints]
@@ -60,7 +63,7 @@ def with_input_rate(
     return replace(
         ocp,
         name=f"{ocp.name}, with input rate",
-        model=_model(m, before, change),
+        model=replace(model, f=ca.vertcat(moved(m.f), now)),
         x0=np.append(np.asarray(ocp.x0), check_numbers(previous, m.nu, f"{ocp.name}: previous")),
         running_cost=moved(ocp.running_cost) + ca.dot(ca.DM(weights), change**2),
         control_bounds=rate,

@@ -1,9 +1,11 @@
 """A problem in normal form, and its solutions in the terms of the user."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
 
 from ocp.checks.errors import ProblemError
@@ -43,24 +45,17 @@ class InNormalForm(Rewriting):
         start[self.form.start] = self.form.copied(data.x0)
         return start
 
-    def guess(self, given: InitialGuess) -> InitialGuess:
+    def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess with what is added; of a solution all that it knows."""
         if isinstance(given, Solution) and given.normal is not None:
             own, normal = self.problem.model, given.normal.problem.model
             if (own.x_names, own.u_names) == (normal.x_names, normal.u_names):
                 return given.normal
-        m = self.original.model
+        m, added = self.original.model, _Added(self.form, given, data)
         widths = {"x": m.nx, "u": m.nu, "costate": m.nx}
-
-        def with_more(part: str, fractions: np.ndarray, values: np.ndarray) -> np.ndarray:
-            if part == "x":
-                return np.hstack([values, self._states(given, fractions, values)])
-            if part == "u":
-                return np.hstack([values, self._slacks(given, fractions, values)])
-            more = self.problem.model.nx - m.nx
-            return np.hstack([values, np.zeros((len(values), more))])
-
-        return RewrittenGuess(given, with_more, widths)
+        # Without states in it, a guess may know constants.
+        instead = {"x": data.x0} if added.known else {}
+        return RewrittenGuess(given, added.sampled, widths, instead)
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""
@@ -88,40 +83,64 @@ class InNormalForm(Rewriting):
             )
         return solution.normal
 
-    def _states(self, given: InitialGuess, fractions: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return the added states that go with a guess of the own ones, (k, n)."""
-        form, nx = self.form, self.original.model.nx
-        whole = np.tile(self.problem.start(), (len(x), 1))
+
+@dataclass(frozen=True, eq=False)
+class _Added:
+    """What a normal form adds to a guess of a run."""
+
+    form: NormalForm
+    given: InitialGuess
+    data: RunData
+
+    @property
+    def known(self) -> Mapping[str, ArrayLike]:
+        """The unknown constants of which the guess has values."""
+        return self.given.unknowns if isinstance(self.given, Guess | Solution) else {}
+
+    def sampled(self, part: str, fractions: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return a part with what is added, (k, n)."""
+        match part:
+            case "x":
+                more = self._states(fractions, values)
+            case "u":
+                more = self._slacks(fractions, values)
+            case _:
+                more = np.zeros((len(values), self.form.problem.model.nx - values.shape[1]))
+        return np.hstack([values, np.where(np.isfinite(more), more, 0.0)])
+
+    def _states(self, fractions: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return the added states: constants, and integrals along the guess."""
+        form, nx = self.form, x.shape[1]
+        whole = np.tile(form.problem.start(), (len(x), 1))
         whole[:, form.start] = form.copied(x[0])
-        known = given.unknowns if isinstance(given, Guess | Solution) else {}
         for name, at in form.unknowns.items():
-            if name in known:
-                whole[:, at] = known[name]
-        whole[:, :nx] = x
-        u = given.sample("u", fractions, self.original.model.nu)
+            if name in self.known:
+                whole[:, at] = self.known[name]
+        u = self.given.sample("u", fractions, form.original.model.nu)
         if form.integrals and u is not None:
-            duration = given.duration or self.original.duration
-            rates = self._rates(whole, u, fractions, duration)
-            for at in form.integrals.values():
-                whole[:, at] = cumulative_trapezoid(
-                    rates[:, at], fractions * duration, axis=0, initial=0.0
-                )
+            along = self._along(form.original.functions.integrands, fractions, x, u)
+            rates = np.split(along, np.cumsum([c.size for c in form.original.at("integral")]), 1)
+            times = fractions * self._duration
+            for at, rate in zip(form.integrals.values(), rates, strict=False):
+                whole[:, at] = cumulative_trapezoid(rate, times, axis=0, initial=0.0)
         return whole[:, nx:]
 
-    def _slacks(self, given: InitialGuess, fractions: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the slacks that go with guessed controls, (k, n)."""
+    def _slacks(self, fractions: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the slacks that go with guessed controls."""
         if not self.form.slacks.numel():
             return np.empty((len(u), 0))
-        ocp = self.original
-        x = given.sample("x", fractions, ocp.model.nx)
-        x = np.tile(ocp.start(), (len(u), 1)) if x is None else x
-        p, t = ocp.parameter_values().at(fractions), fractions[None, :] * ocp.duration
-        return np.array(self.form.slack.map(len(u))(x.T, u.T, t, p.T)).T
+        x = self.given.sample("x", fractions, self.form.original.model.nx)
+        x = np.tile(self.data.x0, (len(u), 1)) if x is None else x
+        return self._along(self.form.slack, fractions, x, u)
 
-    def _rates(
-        self, x: np.ndarray, u: np.ndarray, fractions: np.ndarray, duration: float
+    def _along(
+        self, function: ca.Function, fractions: np.ndarray, x: np.ndarray, u: np.ndarray
     ) -> np.ndarray:
-        """Return the rates of all states along a guess, (k, nx)."""
-        p = self.problem.parameter_values().at(fractions)
-        rate: ca.Function = self.problem.functions.rate.map(len(x))
-        return np.array(rate(x.T, u.T, fractions[None, :] * duration, p.T)).T
+        """Return a function of (x, u, t, p) of the original along the guess, (k, m)."""
+        t, values = self.data.t0 + fractions * self._duration, self.data.values
+        p = self.form.original.values_of(values.as_dict(), self.known, x[0]).at(fractions)
+        return np.array(function.map(len(x))(x.T, u.T, t[None, :], p.T)).T
+
+    @property
+    def _duration(self) -> float:
+        return self.given.duration or self.form.original.duration

@@ -36,7 +36,7 @@ class InSizes(Rewriting):
         """Return the start in sizes."""
         return data.x0 / self.scaled.sizes.x
 
-    def guess(self, given: InitialGuess) -> InitialGuess:
+    def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess that is sampled in sizes."""
         m, sizes = self.original.model, self.scaled.sizes
         size = {"x": sizes.x, "u": sizes.u, "costate": sizes.cost / sizes.x}

@@ -96,7 +96,10 @@ def _end_fault(solution: Solution, verdict: Evaluation, accuracy: float, slack: 
             continue
         is_initial = rows.rows[0].place == "initial"
         function = functions.initial if is_initial else functions.terminal
-        size = np.maximum(_largest_along(solution, function), _bounds(rows))
+        along = np.abs(solution.x).max(axis=0)
+        if rows is not solution.problem.rows.start:
+            along = _largest_along(solution, function)
+        size = np.maximum(along, _bounds(rows))
         size = np.maximum(size, _ZERO * _sizes_of_rows(solution, rows))
         off = excess > accuracy * size + slack * (not is_initial)
         if off.any():
@@ -137,7 +140,8 @@ def _largest_along(solution: Solution, row: ca.Function) -> np.ndarray:
 def _sizes_of_rows(solution: Solution, rows: ConstraintRows) -> np.ndarray:
     """Return the nominal sizes of constraints, or of the states that are bounded, (m,)."""
     sizes = sizes_of(solution.problem)
-    if rows is solution.problem.rows.states:
+    own = solution.problem.rows
+    if rows is own.states or rows is own.start:
         return sizes.x
     return sizes.of_rows(rows)
 

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
@@ -32,8 +32,8 @@ class Rewriting(ABC):
         """Return the start (nx,) in terms of the method, for a run of the original."""
         return data.x0
 
-    def guess(self, given: InitialGuess) -> InitialGuess:
-        """Return a guess in terms of the method, for one of the original."""
+    def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
+        """Return a guess in terms of the method, for one of a run of the original."""
         return given
 
     @abstractmethod
@@ -77,7 +77,7 @@ class RewrittenProgram(Program):
             x0=self.rewriting.start(data),
             t0=t0,
             parameters=parameters,
-            guess=None if given is None else self.rewriting.guess(given),
+            guess=None if given is None else self.rewriting.guess(given, data),
         )
         answer = self.rewriting.answer(found)
         answer = answer.with_(x0=data.x0, solve_time=perf_counter() - started)
@@ -96,11 +96,13 @@ class RewrittenGuess:
         guess: of the original.
         sampled: (part, fractions, what the guess says of it) -> in terms of the method.
         widths: of the parts in terms of the original.
+        instead: one row of a part that the guess says nothing of, where it has to be known.
     """
 
     guess: InitialGuess
     sampled: Callable[[str, np.ndarray, np.ndarray], Sampled]
     widths: Mapping[str, int]
+    instead: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def duration(self) -> float | None:
@@ -110,4 +112,6 @@ class RewrittenGuess:
     def sample(self, part: str, fractions: np.ndarray, width: int) -> Sampled:
         """Return a part at fractions of the horizon, or None."""
         values = self.guess.sample(part, fractions, self.widths[part])
+        if values is None and part in self.instead:
+            values = np.tile(self.instead[part], (len(fractions), 1))
         return None if values is None else self.sampled(part, fractions, values)

@@ -8,6 +8,7 @@ from ocp.method.rewriting import Rewriting, RewrittenGuess
 from ocp.problem.elastic import Elastic
 from ocp.problem.epigraph import Epigraph
 from ocp.problem.ocp import OCP
+from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess
 
@@ -32,7 +33,7 @@ class WithSlacks(Rewriting):
         """The problem with them."""
         return self.extended.problem
 
-    def guess(self, given: InitialGuess) -> InitialGuess:
+    def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess with the slacks that fit."""
         m = self.original.model
 

@@ -189,9 +189,8 @@ class Transcription:
         rows: list[ConstraintRow] = []
         for k in range(self.n):
             rows += [replace(row, node=k + 1) for row in gap]
-            decided = k == 0 and not ocp.has_free_start
-            for row in path:
-                free = decided and not row.on_control
+            for row, is_decided in zip(path, ocp.decided_by_start, strict=True):
+                free = k == 0 and is_decided
                 bounds = {"lower": -np.inf, "upper": np.inf} if free else {}
                 rows.append(replace(row, node=k, **bounds))
             if k == 0:

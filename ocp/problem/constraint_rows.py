@@ -107,7 +107,7 @@ class ConstraintRows:
         constraints = tuple(constraints)
         expression = ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])
         label = "constraint" if place == "path" else f"{place} constraint"
-        on_x, on_u = (_depends(expression, symbols) for symbols in (model.x, model.u))
+        on_x, on_u = (depends_on(expression, symbols) for symbols in (model.x, model.u))
         parts = (
             (c, low, high)
             for c in constraints
@@ -239,6 +239,7 @@ class ProblemRows:
         path: path constraints; those with a control wherever one acts, the others everywhere.
         start: bounds of what is free of the start; at the start.
         initial: at the start.
+        unknowns: bounds of the unknown constants.
         terminal: at the end.
         integral: of the integrals over the horizon.
         invariants: what the exact dynamics keep; no method imposes them.
@@ -250,6 +251,7 @@ class ProblemRows:
     path: ConstraintRows
     start: ConstraintRows
     initial: ConstraintRows
+    unknowns: ConstraintRows
     terminal: ConstraintRows
     integral: ConstraintRows
     invariants: ConstraintRows
@@ -300,7 +302,7 @@ def _kind(c: Constraint, *, on_state: bool, on_control: bool) -> RowKind:
     return "input" if limits else "hard"
 
 
-def _depends(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
+def depends_on(expression: ca.SX, symbols: ca.SX) -> np.ndarray:
     """Return which rows of a column contain any of some symbols, bool (m,)."""
     structure = np.array(ca.DM(ca.jacobian_sparsity(expression, symbols), 1.0))
     return structure.sum(axis=1) > 0.0

@@ -11,9 +11,14 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_scalar
+from ocp.checks.expressions import check_scalar, element_names
 from ocp.problem.constraint import Box, Constraint, Place, check_place
-from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRows
+from ocp.problem.constraint_rows import (
+    ConstraintRow,
+    ConstraintRows,
+    ProblemRows,
+    depends_on,
+)
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.functions import Functions
@@ -33,6 +38,7 @@ from ocp.problem.problem_checks import (
     check_free_start,
     check_start_inside,
     check_symbols,
+    check_unknown_names,
     check_used,
 )
 from ocp.problem.soft import price
@@ -179,6 +185,17 @@ class OCP(Portable):
         """Whether any part of the start is an unknown."""
         return bool(self.start_is_free.any())
 
+    @cached_property
+    def decided_by_start(self) -> np.ndarray:
+        """Which path rows the given part of the start decides by itself, bool (m,).
+
+        No method imposes them there: nothing could meet them.
+        """
+        path, free = self.rows.path, np.flatnonzero(self.start_is_free).tolist()
+        if len(free) == self.model.nx:
+            return np.zeros(len(path), dtype=bool)
+        return ~path.on_control & ~depends_on(path.expression, self.model.x[free, :])
+
     @property
     def start_box(self) -> Box:
         """Bounds of x(t0): those of the states and of the start; none where the start is given."""
@@ -243,11 +260,22 @@ class OCP(Portable):
                 self.start_box, m.x, m.x_names, kind="hard", place="initial"
             ),
             initial=ConstraintRows.of(self.at("initial"), "initial", m),
+            unknowns=self._unknown_rows(),
             terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
             integral=ConstraintRows.of(self.at("integral"), "integral", m),
             invariants=ConstraintRows.of(self.invariants, "path", m),
             time=ConstraintRow("final time", "time", 0, lower, upper),
         )
+
+    def _unknown_rows(self) -> ConstraintRows:
+        none = ConstraintRows((), ca.SX(0, 1))
+        each = [
+            ConstraintRows.of_bounds(
+                e.box, e.symbol, element_names(e.symbol), kind="hard", place="initial"
+            )
+            for e in self.unknowns
+        ]
+        return sum(each, start=none)
 
     def parameter_values(self, given: Mapping[str, ArrayLike] | None = None) -> ParameterValues:
         """Return the numbers of a run: the declared ones, replaced by those ``given``."""
@@ -384,6 +412,7 @@ class OCP(Portable):
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         terms = [model.f, *costs, *[c.expression for c in self.constraints]]
         check_used(name, self.unknowns, terms)
+        check_unknown_names(name, self.unknowns, model.x_names)
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""

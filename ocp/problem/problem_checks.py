@@ -61,6 +61,19 @@ def check_symbols(
             raise ProblemError(f"{owner}: invariant '{c.name}' must hold at='path'")
 
 
+def check_unknown_names(owner: str, unknowns: Iterable[Unknown], others: Sequence[str]) -> None:
+    """Refuse an unknown constant whose symbol has the name of a state, or of another one."""
+    taken = list(others)
+    for entry in unknowns:
+        for name in element_names(entry.symbol):
+            if name in taken:
+                raise ProblemError(
+                    f"{owner}: unknown constant '{entry.name}': its symbol is called '{name}' as "
+                    "another symbol is; give it a name of its own"
+                )
+            taken.append(name)
+
+
 def check_used(owner: str, unknowns: Iterable[Unknown], terms: Sequence[ca.SX]) -> None:
     """Refuse an unknown constant on which none of some terms depends."""
     hashes = {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*terms))}
@@ -90,6 +103,8 @@ def check_free_start(
             raise ProblemError(
                 f"{owner}: free_start: '{name}' is no state; they are {', '.join(names)}"
             )
+        if names.count(name) > 1:
+            raise ProblemError(f"{owner}: free_start: two states are called '{name}'")
     bounded = np.isfinite(bounds.lower) | np.isfinite(bounds.upper)
     for i in np.flatnonzero(bounded & ~free):
         raise ProblemError(

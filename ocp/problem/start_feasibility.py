@@ -22,11 +22,12 @@ def start_violation(ocp: OCP, data: RunData) -> str:
     if ocp.start_is_free.all():
         return ""
     t, rows = np.array([data.t0]), ocp.rows
-    found = [rows.states.largest_violation(data.x0[None, :], t)]
+    free = ocp.start_is_free[None, :]
+    found = [rows.states.largest_violation(data.x0[None, :], t, exempt=free)]
     if rows.path:
         u = ocp.control_bounds.clip(np.zeros(ocp.model.nu))
         values = np.array(ocp.functions.path(data.x0, u, data.t0, data.values.at(0.0)[0])).T
-        exempt = rows.path.on_control[None, :]
+        exempt = ~ocp.decided_by_start[None, :]
         found.append(rows.path.largest_violation(values, t, exempt=exempt))
     worst: Violation = max(found, key=lambda violation: violation.amount)
     return f"{worst}, by the given start itself" if worst.amount > _TOLERANCE else ""

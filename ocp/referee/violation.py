@@ -86,6 +86,12 @@ def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Viol
     yield rows.controls.largest_violation(truth.u_end, t[1:])
     for group, values, instants in values_at_ends(solution, truth):
         yield group.largest_violation(values, instants)
+    if len(rows.unknowns):
+        values = solution.data.values
+        chosen = [
+            v for e, v in zip(values.entries, values.values, strict=True) if e in ocp.unknowns
+        ]
+        yield rows.unknowns.largest_violation(np.concatenate(chosen)[None, :], t[:1])
     if len(rows.integral):
         yield rows.integral.largest_violation(integrals(solution, truth)[None, :], t[-1:])
     yield Violation(

@@ -160,7 +160,7 @@ class CollocatedProblem:
     @cached_property
     def _first_rows(self) -> ConstraintRows:
         path = self.ocp.rows.path
-        return path.where(~path.on_control & self.ocp.has_free_start)
+        return path.where(~path.on_control & ~self.ocp.decided_by_start)
 
     @cached_property
     def rows(self) -> tuple[ConstraintRow, ...]:

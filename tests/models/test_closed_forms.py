@@ -92,7 +92,7 @@ def root_of(function: Callable[[float], float], low: float, high: float) -> floa
 
 
 def roots_of(function: Callable, near: list[float]) -> np.ndarray:
-    roots: Any = fsolve(function, near, xtol=1e-14)
+    roots: Any = fsolve(function, near, xtol=1e-13)
     return roots
 
 
