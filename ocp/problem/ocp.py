@@ -236,6 +236,11 @@ class OCP(Portable):
         return tuple(c for c in self.constraints if c.at == place)
 
     @cached_property
+    def derived(self) -> dict[Any, Any]:
+        """What functions of the problem have made of it, see ``once_per_problem``."""
+        return {}
+
+    @cached_property
     def functions(self) -> Functions:
         """Dynamics, costs with soft prices, and constraints as Functions, built at first use."""
         return Functions.of(

@@ -1,7 +1,9 @@
 """Unknown constants, coupled ends and integrals: each with its closed form, by several methods."""
 
 import copy
+import gc
 import pickle
+import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -196,6 +198,16 @@ def test_a_problem_in_simple_terms_is_its_own_normal_form():
     assert normal_form(plain) is None
     ocp = geared()
     assert normal_form(ocp) is normal_form(ocp)
+
+
+@pytest.mark.parametrize("make", [geared, lambda: geared(x0=[1e6])])
+def test_a_problem_is_forgotten_with_all_that_was_made_of_it(make):
+    ocp = make()
+    solve(ocp, MultipleShooting(4))
+    left = weakref.ref(ocp)
+    del ocp
+    gc.collect()
+    assert left() is None
 
 
 @settings(max_examples=15, deadline=None)
