@@ -134,6 +134,7 @@ class _Functions:
         dynamics: (x, u, t, p) -> rate f, or the change of the state in a step; its Jacobian.
         costs: -> running cost and its gradients in (x, u) and p; the same of the terminal cost.
         constraints: by name: values and Jacobian in (x, u).
+        is_timed: whether any of them depends on the clock.
     """
 
     nx: int
@@ -141,6 +142,7 @@ class _Functions:
     dynamics: ca.Function
     costs: ca.Function
     constraints: dict[str, tuple[Constraint, ca.Function]]
+    is_timed: bool
 
     @classmethod
     def of(cls, ocp: OCP) -> "_Functions":
@@ -157,12 +159,19 @@ class _Functions:
             return ca.Function("c", given, [value, ca.jacobian(value, w)])
 
         constraints = {c.name: (c, row(c)) for c in ocp.constraints}
+        written = [
+            rate,
+            ocp.running_cost,
+            ocp.terminal_cost,
+            *(c.expression for c in ocp.constraints),
+        ]
         return cls(
             nx=m.nx,
             horizon=horizon,
             dynamics=ca.Function("f", given, [rate, ca.jacobian(rate, w)]),
             costs=ca.Function("costs", given, [ca.densify(o) for o in outputs]),
             constraints=constraints,
+            is_timed=ca.depends_on(ca.veccat(*written), m.t),
         )
 
     def _values(self, function: ca.Function, point: _Point) -> list[np.ndarray]:
@@ -170,6 +179,8 @@ class _Functions:
 
         A sine that is zero at an instant but for rounding says nothing of sizes there.
         """
+        if not self.is_timed:
+            return [np.array(here) for here in function(*point)]
         later = point._replace(t=point.t + _TICK * self.horizon)
         each = zip(function(*point), function(*later), strict=True)
         both = ((np.array(here), np.array(there)) for here, there in each)
