@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import inf
+from threading import Lock, get_ident
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from ocp.checks.arguments import (
     check_positive,
 )
 from ocp.checks.errors import ProblemError, UnsupportedProblem
-from ocp.closed_loop.decision import ControlRefused, Decision
+from ocp.closed_loop.decision import ControlRefused, Decision, StepReport
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
 from ocp.closed_loop.plant import Plant
@@ -27,12 +28,13 @@ from ocp.closed_loop.simulate import Observer, closed_loop
 from ocp.mpc.backup_selection import Backup, BackupOption, select_backup
 from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.fallback_ladder import FallbackLadder
-from ocp.mpc.one_at_a_time import OneAtATime
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.step_inputs import Parameters
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import row_sizes
 from ocp.solution.solver import InitialGuess, Solver
+
+T = TypeVar("T")
 
 # What a run may take where a solver sets no limit [s]: far more than a control loop has.
 _TIME_LIMIT = 10.0
@@ -127,12 +129,13 @@ class MPC:
     # The only part that a step changes.
     state: ControllerState = field(init=False, repr=False)
     # A step takes the state that the step before it has left.
-    _alone: OneAtATime = field(init=False, repr=False)
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
+    # The thread that is inside a step.
+    _inside: int | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
         self._check()
-        self._alone = OneAtATime(f"MPC of {self.ocp.name}: step or reset is called inside a step")
         self.backup_law = select_backup(self.backup, self.ocp, self.dt, self.applied)
         self._begin(None, solver_raised=False)
         self._ladder = self._built()
@@ -220,8 +223,7 @@ class MPC:
         """
         size = self.applied.size(self.ocp)
         first = None if acting is None else check_numbers(acting, size, "MPC: acting input")
-        with self._alone:
-            self._begin(first, solver_raised=self.state.solver_raised)
+        self._alone(lambda: self._begin(first, solver_raised=self.state.solver_raised))
 
     def _begin(self, acting: np.ndarray | None, *, solver_raised: bool) -> None:
         begun = ControllerState.at_start(delay_steps(self.delay, self.dt), acting)
@@ -248,12 +250,16 @@ class MPC:
             ProblemError: if x has a wrong shape, t is not finite, or the parameters do not fit.
             ControlRefused: if no rung holds.
         """
-        with self._alone:
+
+        def decide() -> StepReport:
             started = perf_counter()
             broken = self._rebuild() if self.state.solver_raised else ""
             report, self.state = self._ladder.step(
                 self.state, x, t, late=late, parameters=parameters, started=started, broken=broken
             )
+            return report
+
+        report = self._alone(decide)
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)
         return report
@@ -265,6 +271,22 @@ class MPC:
         except CALLBACK_ERRORS as error:
             return f"the solver cannot be built again: {type(error).__name__}: {error}"
         return ""
+
+    def _alone(self, act: Callable[[], T]) -> T:
+        """Let one thread in at a time, and none twice.
+
+        Raises:
+            ProblemError: if a callback of a step calls the controller.
+        """
+        if self._inside == get_ident():
+            raise ProblemError(f"MPC of {self.ocp.name}: step or reset is called inside a step")
+        # The statement, not its methods: Ctrl-C does not come between lock and block.
+        with self._lock:
+            self._inside = get_ident()
+            try:
+                return act()
+            finally:
+                self._inside = None
 
     def run(
         self,
