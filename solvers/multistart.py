@@ -111,13 +111,13 @@ def _random_unknowns(ocp: OCP, rng: np.random.Generator) -> dict[str, np.ndarray
     """Return values of the unknown constants: between two bounds, else around the guess."""
     found = {}
     for entry in ocp.unknowns:
-        low, high = np.asarray(entry.lower), np.asarray(entry.upper)
-        bounded = np.isfinite(low) & np.isfinite(high)
-        around = entry.value + rng.normal(size=entry.value.shape) * (1.0 + np.abs(entry.value))
-        inside = np.where(bounded, low, 0.0) + rng.uniform(size=low.shape) * np.where(
-            bounded, high - low, 0.0
+        around, lower, upper = (
+            1.0 + np.abs(entry.value),
+            *map(np.asarray, (entry.lower, entry.upper)),
         )
-        found[entry.name] = entry.box.clip(np.where(bounded, inside, around))
+        low = np.where(np.isfinite(lower), lower, entry.value - around)
+        high = np.where(np.isfinite(upper), upper, entry.value + around)
+        found[entry.name] = rng.uniform(low, high)
     return found
 
 

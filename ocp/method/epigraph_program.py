@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
 from ocp.method.rewriting import RewrittenProgram
 from ocp.problem.epigraph import Epigraph
@@ -23,7 +22,7 @@ class EpigraphProgram(Program):
     Attributes:
         solver: the options.
         epigraph: the problem with its kinks and without.
-        smooth: solves the one without; compares nothing with the referee.
+        smooth: solves the one without.
         written: solves the problem as it is written, for parameters that turn a kink upside down;
             None where none can.
     """
@@ -61,9 +60,7 @@ class EpigraphProgram(Program):
         # A weight that is negative where nobody looked leaves no lower bound of the cost.
         if written is not None and answer.status is Status.DIVERGED:
             return written.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
-        if not self.solver.judged:
-            return answer
-        return judged(answer, self.solver.success_accuracy, slack=self.solver.end_slack)
+        return answer
 
 
 def _built(solver: MethodSolver, ocp: OCP) -> Program:

@@ -51,11 +51,10 @@ class InNormalForm(Rewriting):
             own, normal = self.problem.model, given.normal.problem.model
             if (own.x_names, own.u_names) == (normal.x_names, normal.u_names):
                 return given.normal
-        m, added = self.original.model, _Added(self.form, given, data)
-        widths = {"x": m.nx, "u": m.nu, "costate": m.nx}
+        added = _Added(self.form, given, data)
         # Without states in it, a guess may know constants.
         instead = {"x": data.x0} if added.known else {}
-        return RewrittenGuess(given, added.sampled, widths, instead)
+        return RewrittenGuess(given, added.sampled, self.original.model, instead)
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""

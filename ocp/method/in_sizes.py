@@ -38,10 +38,11 @@ class InSizes(Rewriting):
 
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess that is sampled in sizes."""
-        m, sizes = self.original.model, self.scaled.sizes
+        sizes = self.scaled.sizes
         size = {"x": sizes.x, "u": sizes.u, "costate": sizes.cost / sizes.x}
-        widths = {"x": m.nx, "u": m.nu, "costate": m.nx}
-        return RewrittenGuess(given, lambda part, _, values: values / size[part], widths)
+        return RewrittenGuess(
+            given, lambda part, _, values: values / size[part], self.original.model
+        )
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution of the scaled problem as one of the original."""

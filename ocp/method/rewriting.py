@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.method.judged import judged
+from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
@@ -95,13 +96,13 @@ class RewrittenGuess:
     Attributes:
         guess: of the original.
         sampled: (part, fractions, what the guess says of it) -> in terms of the method.
-        widths: of the parts in terms of the original.
+        model: of the original.
         instead: one row of a part that the guess says nothing of, where it has to be known.
     """
 
     guess: InitialGuess
     sampled: Callable[[str, np.ndarray, np.ndarray], Sampled]
-    widths: Mapping[str, int]
+    model: Model
     instead: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
@@ -111,7 +112,8 @@ class RewrittenGuess:
 
     def sample(self, part: str, fractions: np.ndarray, width: int) -> Sampled:
         """Return a part at fractions of the horizon, or None."""
-        values = self.guess.sample(part, fractions, self.widths[part])
+        own = self.model.nu if part == "u" else self.model.nx
+        values = self.guess.sample(part, fractions, own)
         if values is None and part in self.instead:
             values = np.tile(self.instead[part], (len(fractions), 1))
         return None if values is None else self.sampled(part, fractions, values)

@@ -28,8 +28,7 @@ class ScalingSolver(MethodSolver):
             return self._build_in_sizes(ocp)
         written = self._build_in_sizes(ocp) if smooth.depends_on_data else None
         program = self.unjudged()._build_in_sizes(smooth.problem)
-        smoothed = RewrittenProgram(WithSlacks(smooth), program)
-        return EpigraphProgram(self, smooth, smoothed, written)
+        return EpigraphProgram(self, smooth, self.judging(WithSlacks(smooth), program), written)
 
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Return the problem with slack controls where this method treats them exactly, or None.

@@ -43,7 +43,7 @@ class WithSlacks(Rewriting):
             x = given.sample("x", fractions, m.nx)
             return np.hstack([values, self.extended.slacks(fractions, x, values)])
 
-        return RewrittenGuess(given, with_slacks, {"x": m.nx, "u": m.nu, "costate": m.nx})
+        return RewrittenGuess(given, with_slacks, m)
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution without slacks."""

@@ -105,12 +105,6 @@ class Draft:
         self.states.append(added)
         return slice(first, first + added.symbol.numel())
 
-    def add_controls(self, added: AddedControls) -> slice:
-        """Add controls, and return where they stand among all."""
-        first = self.ocp.model.nu + sum(s.symbol.numel() for s in self.controls)
-        self.controls.append(added)
-        return slice(first, first + added.symbol.numel())
-
     def problem(self) -> OCP:
         """Return the rewritten problem."""
         ocp, m = self.ocp, self.ocp.model

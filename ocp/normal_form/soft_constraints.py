@@ -16,7 +16,7 @@ import numpy as np
 from ocp.normal_form.draft import AddedControls, AddedStates, Draft
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.scaled import sizes_of
-from ocp.problem.soft import excess
+from ocp.problem.soft import excess, slackened
 
 
 def soften(draft: Draft) -> ca.SX:
@@ -60,23 +60,18 @@ def _add_slack(draft: Draft, c: Constraint, sizes: np.ndarray) -> None:
     box = Box(np.zeros(c.size), np.full(c.size, np.inf))
     price = c.soft.cost(s)
     if c.at == "path":
-        draft.add_controls(AddedControls(s, box, sizes))
+        draft.controls.append(AddedControls(s, box, sizes))
         draft.running_cost += price
     else:
         zero = np.zeros(c.size)
         draft.add_states(AddedStates.constant(draft.ocp, s, zero, size=sizes, box=box))
         draft.terminal_cost += price
-    above, below = (np.flatnonzero(np.isfinite(side)).tolist() for side in (c.upper, c.lower))
-    lower, upper = np.asarray(c.lower)[below], np.asarray(c.upper)[above]
-    for rows, expression, low, high in (
-        (above, c.expression - s, -np.inf, upper),
-        (below, c.expression + s, lower, np.inf),
-    ):
+    for rows, expression, low, high in slackened(c.expression, c.box, s):
         if rows:
             draft.constraints.append(
                 Constraint(
                     draft.unused(c.name),
-                    expression[rows],
+                    expression,
                     low,
                     high,
                     at=c.at,

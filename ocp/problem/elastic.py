@@ -22,6 +22,7 @@ from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import Portable
 from ocp.problem.scaled import sizes_of
+from ocp.problem.soft import slackened
 
 # Weight of a violation of one nominal size all along, relative to the nominal cost.
 _PRICE = 1e4
@@ -51,17 +52,15 @@ class Elastic(Portable):
         ocp, m = self.original, self.original.model
         s, rows = ca.SX.sym(_NAME), self._along
         weight, unit = ca.DM(self.penalty), self._sizes
-        lower, upper = np.asarray(rows.box.lower), np.asarray(rows.box.upper)
-        above = np.flatnonzero(np.isfinite(upper)).tolist()
-        below = np.flatnonzero(np.isfinite(lower)).tolist()
-        scaled = rows.expression / ca.DM(unit)
+        box = Box(np.asarray(rows.box.lower) / unit, np.asarray(rows.box.upper) / unit)
+        above, below = slackened(rows.expression / ca.DM(unit), box, s)
         kept = [c for c in ocp.constraints if c.at == "initial" or c.soft is not None]
         names = {c.name for c in (*kept, *ocp.invariants)}
         inputs = ocp.rows.path.of_kind("input")
         for name, expression, low, high, limits_input in (
             ("input", inputs.expression, inputs.box.lower, inputs.box.upper, True),
-            ("upper", scaled[above] - s, -np.inf, (upper / unit)[above], None),
-            ("lower", scaled[below] + s, (lower / unit)[below], np.inf, None),
+            ("upper", *above[1:], None),
+            ("lower", *below[1:], None),
         ):
             if expression.numel():
                 own = unused(name, names)

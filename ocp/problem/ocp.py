@@ -196,7 +196,7 @@ class OCP(Portable):
             return np.zeros(len(path), dtype=bool)
         return ~path.on_control & ~depends_on(path.expression, self.model.x[free, :])
 
-    @property
+    @cached_property
     def start_box(self) -> Box:
         """Bounds of x(t0): those of the states and of the start; none where the start is given."""
         free, states, own = self.start_is_free, self.state_bounds, self.start_bounds

@@ -1,11 +1,11 @@
-"""The price of what exceeds a soft constraint."""
+"""What exceeds a constraint: its price, and rows that allow it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import casadi as ca
 import numpy as np
 
-from ocp.problem.constraint import Constraint
+from ocp.problem.constraint import Box, Constraint
 
 
 def excess(c: Constraint) -> ca.SX:
@@ -21,6 +21,19 @@ def price(constraints: Iterable[Constraint]) -> ca.SX:
         if c.soft is not None:
             total += c.soft.cost(ca.fabs(excess(c)))
     return total
+
+
+def slackened(
+    expression: ca.SX, box: Box, slack: ca.SX
+) -> Iterator[tuple[list[int], ca.SX, np.ndarray, np.ndarray]]:
+    """Yield lower - slack <= expression <= upper + slack: first what is bounded above, then below.
+
+    Each time: which rows, their expression, its lower and its upper bounds.
+    """
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    above, below = (np.flatnonzero(np.isfinite(side)).tolist() for side in (upper, lower))
+    yield above, (expression - slack)[above, :], np.full(len(above), -np.inf), upper[above]
+    yield below, (expression + slack)[below, :], lower[below], np.full(len(below), np.inf)
 
 
 def _outside(value: ca.SX, low: float, high: float) -> ca.SX:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+import casadi as ca
 import numpy as np
 
 from ocp.problem.constraint_rows import ConstraintRows, Violation
@@ -27,10 +28,17 @@ def invariant_drift(solution: Solution, truth: ReferenceTrajectory) -> float:
 
 def integrals(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
     """Return the integrals of the integral constraints over the horizon, (m,)."""
-    along = solution.problem.functions.integrands.map(len(truth.t) - 1)
+    return truth.integral(*_on_steps(solution.problem.functions.integrands, truth, truth.ends))
+
+
+def _on_steps(
+    function: ca.Function, truth: ReferenceTrajectory, after: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a function of (x, u, t, p) at the starts of the steps, and after them, (K, m) each."""
+    along = function.map(len(truth.t) - 1)
     starts = along(truth.x[:-1].T, truth.u_start.T, truth.t[None, :-1], truth.p_start.T)
-    ends = along(truth.ends.T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
-    return truth.integral(np.array(starts).T, np.array(ends).T)
+    ends = along(after.T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
+    return np.array(starts).T, np.array(ends).T
 
 
 def path_values(
@@ -44,10 +52,7 @@ def path_values(
     ocp = solution.problem
     if not ocp.at("path"):
         return
-    along = ocp.functions.path.map(len(truth.t) - 1)
-    starts = along(truth.x[:-1].T, truth.u_start.T, truth.t[None, :-1], truth.p_start.T)
-    ends = along(truth.x[1:].T, truth.u_end.T, truth.t[None, 1:], truth.p_end.T)
-    at_start, at_end = np.array(starts).T, np.array(ends).T
+    at_start, at_end = _on_steps(ocp.functions.path, truth, truth.x[1:])
     if ocp.model.is_discrete:
         on_control = ocp.rows.path.on_control
         at_end[:, on_control] = at_start[:, on_control]

@@ -1,12 +1,11 @@
 """What a solver returns: a trajectory, its costates, and how it was found."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
@@ -16,13 +15,13 @@ from ocp.checks.errors import ProblemError, SolverError
 from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.normal_form.normal_form import normal_form
+from ocp.problem.constraint import Constraint
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import without_caches
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
-from ocp.problem.soft import excess
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.status import Status
 
@@ -213,21 +212,16 @@ class Solution:
     @property
     def slack(self) -> dict[str, np.ndarray]:
         """Excess of soft constraints by name, (N, m) at all nodes but the last, (m,) at the end."""
-        ocp, before = self.problem, slice(0, len(self.t) - 1)
-        p, u = self.data.values.at(self.fractions[before]), self.control(self.t[before])
-        found = {}
-        for c in ocp.constraints:
-            if c.soft is None:
-                continue
-            m, outside = ocp.model, ca.fabs(excess(c))
-            function = ca.Function("excess", [m.x, m.u, m.t, ocp.p], [ca.densify(outside)])
-            if c.at == "path":
-                along = self.x[before].T, u.T, self.t[None, before], p.T
-                found[c.name] = np.array(function.map(len(u))(*along)).T
-            else:
-                end = self.x[-1], np.zeros(m.nu), self.t[-1], self.data.values.at(1.0)[0]
-                found[c.name] = np.array(function(*end)).ravel()
-        return found
+        ocp, count, values = self.problem, len(self.t) - 1, self.data.values
+        x, u, t = self.x[:-1].T, self.control(self.t[:-1]).T, self.t[None, :-1]
+        path = ocp.functions.path.map(count)(x, u, t, values.at(self.fractions[:-1]).T)
+        end = ocp.functions.terminal(self.x[-1], self.t[-1], values.at(1.0)[0])
+        return {
+            c.name: c.box.excess(rows if c.at == "path" else rows[0])
+            for values, constraints in ((path, ocp.at("path")), (end, ocp.at("terminal")))
+            for c, rows in _split(constraints, np.array(values).T)
+            if c.soft is not None
+        }
 
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
@@ -425,6 +419,14 @@ _SCALARS = {
     "build_time": float,
     "solve_time": float,
 }
+
+
+def _split(
+    constraints: tuple[Constraint, ...], values: np.ndarray
+) -> Iterator[tuple[Constraint, np.ndarray]]:
+    """Yield constraints with their columns of stacked values (k, m)."""
+    ends = np.cumsum([c.size for c in constraints])
+    yield from zip(constraints, np.split(values, ends, axis=1), strict=False)
 
 
 def _instants(t: ArrayLike, what: str) -> np.ndarray:

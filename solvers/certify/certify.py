@@ -53,6 +53,8 @@ _METHODS = 2
 RELATIVE = "relative agreement"
 FEASIBILITY, SECOND_ORDER = "feasibility", "second order"
 AS_WRITTEN = "as written"
+# Costs of a problem and its normal form differ by less, relative to the larger of it and 1.
+_SAME_COST = 1e-8
 # Digits asked of two methods: where no path constraint is active, and where one is.
 SMOOTH_DIGITS, OTHER_DIGITS = 8, 5
 # Digits count from 1; of a smaller cost itself two methods may differ by this share.
@@ -173,18 +175,14 @@ def _in_terms_of_the_user(
     found = certify(rewriting.written(solution), effort)
     estimates = [replace(e, solution=rewriting.answer(e.solution)) for e in found.estimates]
     best = estimates[0]
-    verdict = evaluate(best.solution)
-    apart, limit = abs(verdict.cost - evaluate(rewriting.written(best.solution)).cost), 1e-8
+    verdict, normal = evaluate(best.solution), evaluate(found.solution)
+    apart = abs(verdict.cost - normal.cost)
+    said = f"the referee's costs of problem and normal form differ by {apart:.1e}"
+    feasible = _feasibility(replace(best, violation=verdict.violation), best.is_extremal)
     checks = [
-        Check.at_most(
-            f"{AS_WRITTEN}, cost",
-            apart / max(1.0, abs(verdict.cost)),
-            limit,
-            f"the referee's costs of problem and normal form differ by {apart:.1e}",
-        ),
-        _feasibility(replace(best, violation=verdict.violation), best.is_extremal),
+        Check.at_most(f"{AS_WRITTEN}, cost", apart, _SAME_COST * max(1.0, abs(verdict.cost)), said),
+        replace(feasible, name=f"{AS_WRITTEN}, {FEASIBILITY}"),
     ]
-    checks[1] = replace(checks[1], name=f"{AS_WRITTEN}, {FEASIBILITY}")
     return replace(found, estimates=tuple(estimates), checks=(*found.checks, *checks))
 
 
