@@ -23,9 +23,10 @@ from ocp.mpc.record_file import records
 from ocp.mpc.record_format import Record
 from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.epigraph import without_kinks
+from ocp.problem.free_time import FreeTime
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
-from ocp.problem.ocp import OCP, FreeTime
+from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work

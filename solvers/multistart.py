@@ -111,10 +111,7 @@ def _random_unknowns(ocp: OCP, rng: np.random.Generator) -> dict[str, np.ndarray
     """Return values of the unknown constants: between two bounds, else around the guess."""
     found = {}
     for entry in ocp.unknowns:
-        around, lower, upper = (
-            1.0 + np.abs(entry.value),
-            *map(np.asarray, (entry.lower, entry.upper)),
-        )
+        around, (lower, upper) = 1.0 + np.abs(entry.value), (entry.box.lower, entry.box.upper)
         low = np.where(np.isfinite(lower), lower, entry.value - around)
         high = np.where(np.isfinite(upper), upper, entry.value + around)
         found[entry.name] = rng.uniform(low, high)

@@ -23,6 +23,7 @@ from ocp.problem.constraint import Constraint
 from ocp.problem.constraint_rows import ConstraintRows
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
+from ocp.problem.size_equations import SizeEquation, solved
 
 # How much each kind of knowledge counts: what is declared, bounds, start and guess, dynamics, the
 # rate at the start (which fast dynamics keep up for much less than T), cost, rows.
@@ -33,8 +34,6 @@ _ROUNDING = 1e-9
 # What changes by more than this part of itself with a tick of the clock, a part of the horizon, is
 # decided by rounding.
 _UNSTEADY, _TICK = 0.5, 1e-12
-# A limit so many sizes away, in logarithms, says nothing of them.
-_FAR = float(np.log(1e4))
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
@@ -86,20 +85,6 @@ class _Point(NamedTuple):
     p: np.ndarray
 
 
-class _Equation(NamedTuple):
-    """weight * (sum of log sizes at ``plus`` - those at ``minus`` - ``value``) = 0.
-
-    One of a limit, which may be written far away to mean that there is none, is left out where
-    everything else says that nothing comes near it.
-    """
-
-    weight: float
-    plus: tuple[int, ...]
-    minus: tuple[int, ...]
-    value: float
-    is_limit: bool = False
-
-
 def nominal_sizes(ocp: OCP) -> Sizes:
     """Return the nominal sizes of a problem; what the user declared as nominal stays."""
     functions, points = _Functions.of(ocp), _points(ocp)
@@ -107,12 +92,12 @@ def nominal_sizes(ocp: OCP) -> Sizes:
     known = [*_given(ocp), *functions.rate_sizes(points[0])]
     # Before anything is known of sizes no point lies a size away.
     at_points = [e for p in points for e in (*functions.equations(p), *functions.of_costs(p))]
-    log_sizes = _solved([*known, *at_points], size)
+    log_sizes = solved([*known, *at_points], size)
     for _ in range(_ROUNDS):
         equations = [*known, *at_points]
         for point, beside in zip(points, _displaced(ocp, points, np.exp(log_sizes)), strict=True):
             equations += [*functions.equations(beside), *functions.of_curvature(point, beside)]
-        log_sizes = _solved(equations, size)
+        log_sizes = solved(equations, size)
     nx = ocp.model.nx
     x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
     if ocp.model.x_nominal is not None:
@@ -190,7 +175,7 @@ class _Functions:
                 for here, there in both
             ]
 
-    def equations(self, point: _Point) -> Iterator[_Equation]:
+    def equations(self, point: _Point) -> Iterator[SizeEquation]:
         """Yield what dynamics and constraints at a point say of the sizes."""
         yield from self._of_dynamics(point)
         for c, function in self.constraints.values():
@@ -201,24 +186,24 @@ class _Functions:
                 if offset[i] > 0.0:
                     size = float(np.log(offset[i]) - np.log(abs(jacobian[i, j])))
                     is_limit = bool(np.ravel(c.lower)[i] != np.ravel(c.upper)[i])
-                    yield _Equation(_ROW, (int(j),), (), size, is_limit)
+                    yield SizeEquation(_ROW, (int(j),), (), size, is_limit)
 
-    def rate_sizes(self, point: _Point) -> Iterator[_Equation]:
+    def rate_sizes(self, point: _Point) -> Iterator[SizeEquation]:
         """Yield what the rate at a point says of the sizes by itself."""
         rate, jacobian = self._values(self.dynamics, point)
         rate = self.horizon * rate.ravel()
         terms = self.horizon * np.abs(jacobian) @ np.abs(np.concatenate([point.x, point.u]))
         for i in np.flatnonzero(_usable(rate) & (np.abs(rate) > _ROUNDING * terms)).tolist():
-            yield _Equation(_RATE, (i,), (), float(np.log(abs(rate[i]))))
+            yield SizeEquation(_RATE, (i,), (), float(np.log(abs(rate[i]))))
 
-    def _of_dynamics(self, point: _Point) -> Iterator[_Equation]:
+    def _of_dynamics(self, point: _Point) -> Iterator[SizeEquation]:
         jacobian = self.horizon * self._values(self.dynamics, point)[1]
         for i, j in zip(*np.nonzero(_usable(jacobian)), strict=True):
             if i != j:
                 gain = float(np.log(abs(jacobian[i, j])))
-                yield _Equation(_DYNAMICS, (int(i),), (int(j),), gain)
+                yield SizeEquation(_DYNAMICS, (int(i),), (int(j),), gain)
 
-    def of_curvature(self, point: _Point, beside: _Point) -> Iterator[_Equation]:
+    def of_curvature(self, point: _Point, beside: _Point) -> Iterator[SizeEquation]:
         """Yield what the change of the cost's slopes between two points says of the sizes."""
         here, there = ([np.array(v).ravel() for v in self.costs(*at)] for at in (point, beside))
         moved = np.concatenate([beside.x - point.x, beside.u - point.u])
@@ -227,18 +212,18 @@ class _Functions:
             change[np.abs(change) <= _ROUNDING * np.abs(here[i])] = 0.0
             for j in np.flatnonzero(_usable(change) & _usable(moved)).tolist():
                 curvature = share * abs(change[j] / moved[j])
-                yield _Equation(_COST, (len(moved),), (j, j), float(np.log(curvature)))
+                yield SizeEquation(_COST, (len(moved),), (j, j), float(np.log(curvature)))
 
-    def of_costs(self, point: _Point) -> Iterator[_Equation]:
+    def of_costs(self, point: _Point) -> Iterator[SizeEquation]:
         """Yield what values and slopes of the cost at a point say of the sizes."""
         values = [v.ravel() for v in self._values(self.costs, point)]
         cost = len(values[1])  # its place among the sizes
         for share, (value, slope, by_p) in ((self.horizon, values[:3]), (1.0, values[3:])):
             own = share * np.concatenate([value, by_p * point.p])
             for size in own[_usable(own)]:
-                yield _Equation(_COST, (cost,), (), float(np.log(abs(size))))
+                yield SizeEquation(_COST, (cost,), (), float(np.log(abs(size))))
             for j in np.flatnonzero(_usable(slope)).tolist():
-                yield _Equation(_COST, (cost,), (j,), float(np.log(share * abs(slope[j]))))
+                yield SizeEquation(_COST, (cost,), (j,), float(np.log(share * abs(slope[j]))))
 
     def row_sizes(self, c: Constraint, points: Iterable[_Point], w: np.ndarray) -> np.ndarray:
         """Return how much each row of a constraint changes along the sizes of x and u.
@@ -294,12 +279,12 @@ def _displaced(ocp: OCP, points: list[_Point], sizes: np.ndarray) -> list[_Point
     return found
 
 
-def _given(ocp: OCP) -> Iterator[_Equation]:
+def _given(ocp: OCP) -> Iterator[SizeEquation]:
     """Yield what the user, start, guess and bounds say of the sizes by themselves."""
     m = ocp.model
     for declared, first in ((m.x_nominal, 0), (m.u_nominal, m.nx)):
         for j, size in enumerate([] if declared is None else np.ravel(declared)):
-            yield _Equation(_DECLARED, (first + j,), (), float(np.log(size)))
+            yield SizeEquation(_DECLARED, (first + j,), (), float(np.log(size)))
     rows = [(_GIVEN, 0, ocp.start()[None, :])]
     if ocp.guess is not None:
         for part, first, width in (("x", 0, m.nx), ("u", m.nx, m.nu)):
@@ -313,7 +298,7 @@ def _given(ocp: OCP) -> Iterator[_Equation]:
         largest = np.abs(samples).max(axis=0)
         for j in np.flatnonzero(_usable(largest)).tolist():
             size = float(np.log(largest[j]))
-            yield _Equation(weight, (first + j,), (), size, weight == _BOUND)
+            yield SizeEquation(weight, (first + j,), (), size, weight == _BOUND)
 
 
 def _distance(c: Constraint, value: np.ndarray) -> np.ndarray:
@@ -340,36 +325,3 @@ def _offset(c: Constraint, value: np.ndarray, terms: np.ndarray) -> np.ndarray:
 
 def _usable(values: np.ndarray) -> np.ndarray:
     return np.isfinite(values) & (values != 0.0)
-
-
-def _solved(equations: Iterable[_Equation], size: int) -> np.ndarray:
-    """Return the logarithms by least squares, 0 for what nothing is known of."""
-    every = list(equations)
-    others = [e for e in every if not e.is_limit]
-    if len(others) == len(every) or not others:
-        return _least_squares(every, size)
-    matrix = np.array([_row(e, size) for e in others])
-    # What the others determine is left where it is by the projection on their rows.
-    known = np.abs(np.diag(np.linalg.pinv(matrix, rcond=1e-9) @ matrix) - 1.0) < 1e-6
-    logs = _least_squares(others, size)
-
-    def is_near(e: _Equation) -> bool:
-        apart = e.value - logs[list(e.plus)].sum() + logs[list(e.minus)].sum()
-        return apart < _FAR or not known[[*e.plus, *e.minus]].all()
-
-    return _least_squares([e for e in every if not e.is_limit or is_near(e)], size)
-
-
-def _least_squares(equations: list[_Equation], size: int) -> np.ndarray:
-    if not equations:
-        return np.zeros(size)
-    matrix = np.array([_row(e, size) for e in equations])
-    right = np.array([e.weight * e.value for e in equations])
-    return np.linalg.lstsq(matrix, right, rcond=1e-9)[0]
-
-
-def _row(equation: _Equation, size: int) -> np.ndarray:
-    row = np.zeros(size)
-    np.add.at(row, list(equation.plus), equation.weight)
-    np.subtract.at(row, list(equation.minus), equation.weight)
-    return row

@@ -21,6 +21,7 @@ from ocp.problem.constraint_rows import (
 )
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
+from ocp.problem.free_time import FreeTime
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
@@ -42,32 +43,6 @@ from ocp.problem.problem_checks import (
     check_used,
 )
 from ocp.problem.soft import price
-
-
-@dataclass(frozen=True)
-class FreeTime:
-    """A final time the optimiser chooses.
-
-    Args:
-        guess: first guess of the duration [s].
-        lower: shortest duration [s]; keep it positive.
-        upper: longest duration [s].
-    """
-
-    guess: float
-    lower: float = 1e-3
-    upper: float = np.inf
-
-    def __post_init__(self) -> None:
-        """Check the three durations and their order."""
-        check_positive(self.guess, "free final time: guess")
-        check_positive(self.lower, "free final time: lower")
-        check_positive(self.upper, "free final time: upper", finite=False)
-        if not self.lower <= self.guess <= self.upper:
-            raise ProblemError(
-                f"free final time: 0 < lower <= guess <= upper is needed, "
-                f"not {self.lower}, {self.guess}, {self.upper} [s]"
-            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -175,6 +150,10 @@ class OCP(Portable):
     @property
     def start_is_free(self) -> np.ndarray:
         """Which states start where the optimiser chooses, bool (nx,)."""
+        return self._start_is_free
+
+    @cached_property
+    def _start_is_free(self) -> np.ndarray:
         if self.free_start:
             return np.array([name in self.free_start for name in self.model.x_names], dtype=bool)
         on_manifold = any(c.at == "initial" for c in self.constraints)
