@@ -74,8 +74,10 @@ def check_unknown_names(owner: str, unknowns: Iterable[Unknown], others: Sequenc
             taken.append(name)
 
 
-def check_used(owner: str, unknowns: Iterable[Unknown], terms: Sequence[ca.SX]) -> None:
+def check_used(owner: str, unknowns: Sequence[Unknown], terms: Sequence[ca.SX]) -> None:
     """Refuse an unknown constant on which none of some terms depends."""
+    if not unknowns:  # a long expression is not searched for nothing
+        return
     hashes = {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*terms))}
     for entry in unknowns:
         for symbol in ca.vertsplit(entry.symbol):
