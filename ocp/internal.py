@@ -30,11 +30,13 @@ from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
 from ocp.method.rewriting_of import rewriting_of
 from ocp.method.scaling_solver import ScalingSolver
+from ocp.method.with_slacks import WithSlacks
 from ocp.minimum_principle.hamiltonian import hamiltonian
 from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
-from ocp.normal_form.normal_form import normal_form
+from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.problem.algebraic_controls import AlgebraicControls
 from ocp.problem.constraint_rows import (
     ConstraintRow,
     ConstraintRows,
@@ -60,6 +62,7 @@ from ocp.solution.solver import BuiltProgram
 __all__ = [
     "ACCURACY",
     "QUIET",
+    "AlgebraicControls",
     "BufferedFunction",
     "BufferedNlp",
     "BuiltProgram",
@@ -74,6 +77,7 @@ __all__ = [
     "Matrices",
     "MethodProgram",
     "MethodSolver",
+    "NormalForm",
     "ParameterValues",
     "PiecewisePolynomial",
     "Portable",
@@ -85,6 +89,7 @@ __all__ = [
     "Stage",
     "Transcription",
     "Violation",
+    "WithSlacks",
     "append_line",
     "applied",
     "bernstein",

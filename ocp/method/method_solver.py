@@ -10,7 +10,7 @@ from ocp.checks.arguments import check_flag, check_instance
 from ocp.checks.interrupts import interruptible
 from ocp.method.in_normal_form import InNormalForm
 from ocp.method.rewriting import Rewriting, RewrittenProgram
-from ocp.normal_form.normal_form import normal_form
+from ocp.normal_form.normal_form import NormalForm, normal_form
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
 from ocp.solution.solver import Program, Solver
@@ -49,8 +49,11 @@ class MethodSolver(Solver):
         form = normal_form(ocp)
         if form is None:
             return self.build_normal(ocp)
-        program = self.unjudged().build_normal(form.problem)
-        return self.judging(InNormalForm(form), program)
+        return self.judging(InNormalForm(form), self.unjudged().build_form(form))
+
+    def build_form(self, form: NormalForm) -> Program:
+        """Build it for a problem in its normal form; here with algebraic variables solved for."""
+        return self.build_normal(form.problem)
 
     def build_normal(self, ocp: OCP) -> Program:
         """Build it for a problem in normal form; here in the units it is written in."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp.method.rewriting import Rewriting, RewrittenGuess
+from ocp.problem.algebraic_controls import AlgebraicControls
 from ocp.problem.elastic import Elastic
 from ocp.problem.epigraph import Epigraph
 from ocp.problem.ocp import OCP
@@ -21,7 +22,7 @@ class WithSlacks(Rewriting):
         extended: the problem without slacks, and how they follow from a trajectory.
     """
 
-    extended: Epigraph | Elastic
+    extended: Epigraph | Elastic | AlgebraicControls
 
     @property
     def original(self) -> OCP:

@@ -21,7 +21,7 @@ class NormalForm(Portable):
 
     Attributes:
         original: the problem as it was written.
-        problem: the one that methods get.
+        implicit: the one that methods get, with the algebraic variables of the original.
         unknowns: where unknown constants stand among its states, by name.
         integrals: where integrals stand among its states, by name of the constraint.
         start: where the state at the start stands among its states; nowhere where no term has it.
@@ -29,11 +29,16 @@ class NormalForm(Portable):
     """
 
     original: OCP
-    problem: OCP
+    implicit: OCP
     unknowns: dict[str, slice]
     integrals: dict[str, slice]
     start: slice
     slacks: ca.SX
+
+    @property
+    def problem(self) -> OCP:
+        """The one that methods get: the algebraic variables are solved for."""
+        return self.implicit.explicit
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -42,15 +47,15 @@ class NormalForm(Portable):
     @cached_property
     def slack(self) -> ca.Function:
         """(x, u, t, p) -> the controls behind the own ones that fit, p that of the original."""
-        m = self.original.model
-        return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(self.slacks)])
+        m, slacks = self.original.model, self.original.algebraic_solution(self.slacks)
+        return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(slacks)])
 
 
 @once_per_problem
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    if not (ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
+    if not (ocp.model.nz or ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
         return None
     draft = Draft.of(ocp)
     slacks = soften(draft)

@@ -24,7 +24,8 @@ class Model(Portable):
     .. math:: \dot x = f(x, u, t) \quad (\text{dt is None}), \qquad
               x_{k+1} = f(x_k, u_k, t_k) \quad (\text{dt a number})
 
-    Source: thesis (1.1) and (1.6).
+    With algebraic variables z, f is of them too, and 0 = g(x, u, z, t) at all times. The index is
+    1: g determines z. Source: thesis (1.1) and (1.6).
 
     Args:
         name: what people call it.
@@ -41,6 +42,11 @@ class Model(Portable):
         start: symbols of the state at the start (nx,), for costs and constraints that couple both
             ends of a trajectory, such as ``x - model.start`` at the end of a period; they are made
             by the model.
+        z: symbols of algebraic variables, an ``SX`` column (nz,), for f, costs and constraints.
+        algebraic: g, which is zero (nz,).
+        z_guess: where a root of g is looked for, numbers (nz,) or an expression in x, u, t and
+            parameters; needed where g is not linear in z. Of several roots it says which is meant.
+        z_units: a unit for each algebraic variable.
         u_is_change: whether the controls are changes of what an actuator holds, see
             ``with_input_rate``: to hold is then to send zero.
 
@@ -58,13 +64,17 @@ class Model(Portable):
     u_units: tuple[str, ...] = ()
     x_nominal: ArrayLike | None = None
     u_nominal: ArrayLike | None = None
+    z: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    algebraic: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+    z_guess: ca.SX | ArrayLike | None = None
+    z_units: tuple[str, ...] = ()
     u_is_change: bool = False
     start: ca.SX = field(default_factory=ca.SX)
 
     def __post_init__(self) -> None:
         """Check every shape and symbol."""
         check_instance(self.name, str, "the name of a model")
-        for label in ("x", "u", "t"):
+        for label in ("x", "u", "t", "z"):
             check_symbols(getattr(self, label), f"model '{self.name}': {label}")
         if self.t.numel() != 1:
             raise ProblemError(
@@ -76,12 +86,14 @@ class Model(Portable):
                 f"model '{self.name}': f has {f.numel()} rows, but there are {self.nx} states x"
             )
         object.__setattr__(self, "f", f)
+        self._check_algebraic()
         if self.start.numel() != self.nx:  # none yet, or those of a model with other states
             named = [ca.SX.sym(f"{name}(t0)") for name in self.x_names]
             object.__setattr__(self, "start", ca.vertcat(ca.SX(0, 1), *named))
         if self.dt is not None:
             check_positive(self.dt, f"model '{self.name}': dt")
-        for label, units, size in (("x", self.x_units, self.nx), ("u", self.u_units, self.nu)):
+        for label in ("x", "u", "z"):
+            units, size = getattr(self, f"{label}_units"), getattr(self, label).numel()
             check_instance(units, (tuple, list), f"model '{self.name}': {label}_units")
             if units and len(units) != size:
                 raise ProblemError(
@@ -93,6 +105,27 @@ class Model(Portable):
             what = f"model '{self.name}': {label}"
             object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))
 
+    def _check_algebraic(self) -> None:
+        """Check the algebraic equations and where their root is looked for."""
+        g = check_column(self.algebraic, f"model '{self.name}': algebraic")
+        if g.numel() != self.nz:
+            raise ProblemError(
+                f"model '{self.name}': algebraic has {g.numel()} rows, but there are {self.nz} "
+                "algebraic variables z; each needs an equation"
+            )
+        object.__setattr__(self, "algebraic", g)
+        if self.z_guess is None:
+            return
+        guess = check_column(self.z_guess, f"model '{self.name}': z_guess")
+        if guess.numel() != self.nz:
+            raise ProblemError(
+                f"model '{self.name}': z_guess has {guess.numel()} rows, but there are {self.nz} "
+                "algebraic variables z"
+            )
+        if not guess.is_regular():
+            raise ProblemError(f"model '{self.name}': z_guess = {guess} is not finite")
+        object.__setattr__(self, "z_guess", guess)
+
     @cached_property
     def nx(self) -> int:
         """Number of states."""
@@ -102,6 +135,11 @@ class Model(Portable):
     def nu(self) -> int:
         """Number of controls."""
         return self.u.numel()
+
+    @cached_property
+    def nz(self) -> int:
+        """Number of algebraic variables."""
+        return self.z.numel()
 
     @property
     def is_discrete(self) -> bool:
@@ -118,7 +156,15 @@ class Model(Portable):
         """Names of the controls, read off the symbols."""
         return element_names(self.u)
 
+    @property
+    def z_names(self) -> tuple[str, ...]:
+        """Names of the algebraic variables, read off the symbols."""
+        return element_names(self.z)
+
     def refuse_foreign_symbols(self, parameters: ca.SX) -> None:
-        """Raise ``ProblemError`` if ``f`` has a symbol that is no x, u, t or parameter."""
-        allowed = [self.x, self.u, self.t, parameters]
-        refuse_foreign_symbols(self.f, allowed, f"model '{self.name}': f")
+        """Raise ``ProblemError`` if an expression has a symbol that is declared nowhere."""
+        known = [self.x, self.u, self.t, parameters]
+        refuse_foreign_symbols(self.f, [*known, self.z], f"model '{self.name}': f")
+        refuse_foreign_symbols(self.algebraic, [*known, self.z], f"model '{self.name}': algebraic")
+        if self.z_guess is not None:
+            refuse_foreign_symbols(self.z_guess, known, f"model '{self.name}': z_guess")

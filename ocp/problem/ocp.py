@@ -1,7 +1,7 @@
 """The optimal control problem in Bolza form, written once for every solver."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_scalar, element_names
+from ocp.problem.algebraic import AlgebraicSolution
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -139,6 +140,7 @@ class OCP(Portable):
             *(e for e in (self.running_cost, self.terminal_cost) if isinstance(e, ca.SX)),
             *(c.expression for c in (*self.constraints, *self.invariants)),
             self.model.f,
+            self.model.algebraic,
         ]
         return any(s.element_hash() in start for s in ca.symvar(ca.veccat(*written)))
 
@@ -220,8 +222,36 @@ class OCP(Portable):
         return {}
 
     @cached_property
+    def explicit(self) -> "OCP":
+        """The problem with its algebraic variables solved for; itself where it has none."""
+        if not self.model.nz:
+            return self
+        solved = self.algebraic_solution
+        return replace(self, model=solved.explicit_model, **self.terms(solved))
+
+    @cached_property
+    def algebraic_solution(self) -> AlgebraicSolution:
+        """The algebraic variables in terms of everything else."""
+        return AlgebraicSolution.of(self.model)
+
+    def terms(self, rewritten: Callable[[ca.SX | float], ca.SX]) -> dict[str, Any]:
+        """Return costs, constraints and invariants with every expression rewritten."""
+
+        def each(constraints: tuple[Constraint, ...]) -> tuple[Constraint, ...]:
+            return tuple(replace(c, expression=rewritten(c.expression)) for c in constraints)
+
+        return {
+            "running_cost": rewritten(self.running_cost),
+            "terminal_cost": rewritten(self.terminal_cost),
+            "constraints": each(self.constraints),
+            "invariants": each(self.invariants),
+        }
+
+    @cached_property
     def functions(self) -> Functions:
         """Dynamics, costs with soft prices, and constraints as Functions, built at first use."""
+        if self.model.nz:
+            return self.explicit.functions
         return Functions.of(
             self.model,
             self.p,
@@ -234,6 +264,8 @@ class OCP(Portable):
     @cached_property
     def rows(self) -> ProblemRows:
         """Bounds and constraints as rows that know where they hold, built at first use."""
+        if self.model.nz:
+            return self.explicit.rows
         m, box = self.model, self.time_box
         lower, upper = float(np.asarray(box.lower)[0]), float(np.asarray(box.upper)[0])
         return ProblemRows(

@@ -40,10 +40,10 @@ def check_symbols(
         constraints: of any place.
         invariants: they hold along the way.
     """
-    everywhere, at_ends = [model.x, model.u, model.t, p], [model.x, model.t, p]
+    everywhere, at_ends = [model.x, model.u, model.t, p, model.z], [model.x, model.t, p, model.z]
     symbols = ca.vertcat(*everywhere)
     if len({e.element_hash() for e in ca.vertsplit(symbols)}) < len(element_names(symbols)):
-        raise ProblemError(f"{owner}: a symbol is declared twice among x, u, t and parameters")
+        raise ProblemError(f"{owner}: a symbol is declared twice among x, u, t, z and parameters")
     model.refuse_foreign_symbols(p)
     refuse_foreign_symbols(costs[0], everywhere, f"{owner}: running_cost")
     refuse_foreign_symbols(costs[1], at_ends, f"{owner}: terminal_cost")

@@ -32,7 +32,7 @@ _BASE = 2.0
 @once_per_problem
 def sizes_of(ocp: OCP) -> Sizes:
     """Return the nominal sizes of a problem."""
-    return nominal_sizes(ocp)
+    return nominal_sizes(ocp.explicit)
 
 
 @once_per_problem

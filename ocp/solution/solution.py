@@ -184,7 +184,7 @@ class Solution:
     @property
     def is_scaled(self) -> bool:
         """Whether solvers scale the problem by its sizes; one that is well scaled they do not."""
-        return scaled(self.problem) is not None
+        return scaled(self.problem.explicit) is not None
 
     @property
     def data(self) -> RunData:

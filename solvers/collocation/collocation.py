@@ -7,12 +7,15 @@ import numpy as np
 
 from ocp import OCP, InitialGuess, Program, Solution, Status, UnsupportedProblem
 from ocp.internal import (
+    AlgebraicControls,
     Epigraph,
     ImposedRows,
     MethodProgram,
+    NormalForm,
     RunData,
     RunResult,
     ScalingSolver,
+    WithSlacks,
     check_flag,
     check_instance,
     check_positive,
@@ -126,6 +129,14 @@ class Collocation(ScalingSolver):
     def smooth_form(self, ocp: OCP) -> Epigraph | None:
         """Replace every kink: slacks and maxima meet at the collocation points."""
         return epigraph(ocp)
+
+    def build_form(self, form: NormalForm) -> Program:
+        """Take algebraic variables as controls: their equations hold at the points."""
+        variables = AlgebraicControls(form.implicit)
+        if not variables.is_needed:
+            return super().build_form(form)
+        program = self.build_normal(variables.problem)
+        return self.judging(WithSlacks(variables), program)
 
     def imposed(self, ocp: OCP) -> ImposedRows:
         """Return the rows of the problem, which hold at the points, not at the edges; see above.
