@@ -1,6 +1,7 @@
 """A problem with slack controls, and its solutions without them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,9 +21,11 @@ class WithSlacks(Rewriting):
 
     Attributes:
         extended: the problem without slacks, and how they follow from a trajectory.
+        instead: one row of a part that a guess says nothing of, where that has to be known.
     """
 
     extended: Epigraph | Elastic | AlgebraicControls
+    instead: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def original(self) -> OCP:
@@ -44,7 +47,7 @@ class WithSlacks(Rewriting):
             x = given.sample("x", fractions, m.nx)
             return np.hstack([values, self.extended.slacks(fractions, x, values)])
 
-        return RewrittenGuess(given, with_slacks, m)
+        return RewrittenGuess(given, with_slacks, m, self.instead)
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution without slacks."""

@@ -122,6 +122,7 @@ def instantaneous(
     check_positive(reach, "instantaneous control: reach [s]")
     if sent not in ("control", "rate"):
         raise ProblemError(f"instantaneous control: sent = {sent!r} is neither control nor rate")
+    ocp = ocp.explicit
     m, control = ocp.model, minimum_principle(ocp).control
     u0 = ocp.control_bounds.clip(np.zeros(m.nu))
     slope = ca.Function(

@@ -141,6 +141,7 @@ def _refuse_blind(ocp: OCP) -> None:
     A cost sees the states in it, and those that move what it sees. A price of the heating alone
     sees no temperature: the law that minimises it lets the room freeze.
     """
+    ocp = ocp.explicit
     m = ocp.model
     moved = np.array(ca.DM(ca.jacobian_sparsity(m.f, m.x), 1.0)) > 0.0
     seen = _contained(ca.SX(ocp.running_cost), m.x)
@@ -184,6 +185,7 @@ def is_redundant(ocp: OCP) -> bool:
     (3.17), not for a body whose invariant is the norm of its quaternion. Counted in numbers at
     the start and near it: the products of a pseudoinverse do not cancel symbolically.
     """
+    ocp = ocp.explicit
     m = ocp.model
     if m.is_discrete or not ocp.invariants:
         return False

@@ -82,6 +82,10 @@ class PlottableSolution(Protocol):
         """Costates at time(s) t [s]."""
         ...
 
+    def algebraic(self, t: ArrayLike) -> np.ndarray:
+        """Algebraic variables at time(s) t [s]."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class _Panel:
@@ -105,9 +109,9 @@ class _Panel:
 def plot_solution(solution: PlottableSolution) -> Figure:
     """Return a figure of a solution; save it with ``figure.savefig``.
 
-    States, controls, costates, and where the problem has them path constraints and
-    invariants; bounds near the lines are thin and dashed. Held quantities are steps, those
-    of an extremal are smooth between its nodes.
+    States, controls, costates, and where the problem has them algebraic variables, path
+    constraints and invariants; bounds near the lines are thin and dashed. Held quantities are
+    steps, those of an extremal are smooth between its nodes.
 
     Args:
         solution: of any solver. What is drawn and what the title gives as its cost is its
@@ -154,6 +158,11 @@ def _controls(solution: PlottableSolution) -> _Panel:
     m = ocp.model
     u = solution.u if solution.control_kind == "held" else solution.control(t)
     return _Panel("controls", m.u_names, m.u_units, t, u, ocp.control_bounds)
+
+
+def _algebraic(solution: PlottableSolution) -> _Panel:
+    m, t = solution.problem.model, _instants(solution)
+    return _Panel("algebraic variables", m.z_names, m.z_units, t, solution.algebraic(t))
 
 
 def _costates(solution: PlottableSolution) -> _Panel:
@@ -203,6 +212,7 @@ def _row_names(rows: ConstraintRows) -> tuple[str, ...]:
 _PANELS: tuple[Callable[[PlottableSolution], _Panel], ...] = (
     _states,
     _controls,
+    _algebraic,
     _costates,
     _path,
     _invariants,

@@ -21,9 +21,15 @@ from ocp.problem.model import Model
 # A root is found where no row is larger than this, relative to what its variables bring to it.
 _ACCURACY = 1e-9
 # Newton's method ends with a step that is so small, relative to the guess.
-_LAST_STEP = 1e-12
-_FULL_STEPS = 12
-_SEARCHED_STEPS = 200
+_NEWTON = {
+    "abstol": 0.0,
+    "abstolStep": 1e-12,
+    "max_iter": 100,
+    "error_on_fail": False,
+    "show_eval_warnings": False,
+}
+# Steps in which a root is followed that is not found at once.
+_STAGES = 24
 # The Jacobian counts as singular below this, where its largest entries are 1.
 _SINGULAR = 1e-10
 
@@ -123,13 +129,13 @@ def _equation(model: Model, row: int) -> str:
 
 def _root(model: Model, g: ca.SX, columns: list[int]) -> ca.SX:
     """Return the root of g for some of the variables, an expression in all other symbols of it."""
-    z, start = model.z[columns], model.z_guess
-    if start is None:
+    z = model.z[columns]
+    if model.z_guess is None:
         raise ProblemError(
             f"model '{model.name}': {readable(g[0])} = 0 is not linear in {z[0]}: Newton's method "
             "needs Model(z_guess=...) to start from, which also says which root is meant"
         )
-    first, own = start[columns], {e.element_hash() for e in ca.vertsplit(z)}
+    first, own = model.z_start[columns], {e.element_hash() for e in ca.vertsplit(z)}
     given = [e for e in ca.symvar(ca.vertcat(g, first)) if e.element_hash() not in own]
     others = ca.vertcat(ca.SX(0, 1), *given)
     return _newton(z, others, g, first)(others)
@@ -138,27 +144,29 @@ def _root(model: Model, g: ca.SX, columns: list[int]) -> ca.SX:
 def _newton(z: ca.SX, others: ca.SX, g: ca.SX, start: ca.SX) -> ca.Function:
     """(others) -> the root of g(z, others) that Newton's method finds from a start, or NaN.
 
-    Full steps come first, which is quick; where they fail, steps with a line search.
+    Where it does not converge at once, the root is followed from the start: of equations that the
+    start solves, step by step to those that are asked for.
     """
     unit = ca.vertcat(*[_unit(e) for e in ca.vertsplit(start)])
-    in_units = {"x": z, "p": others, "g": ca.substitute(g, z, unit * z)}
-    ends = {
-        "abstol": 0.0,
-        "abstolStep": _LAST_STEP,
-        "error_on_fail": False,
-        "show_eval_warnings": False,
-    }
-    few, many = ({**ends, "max_iter": steps} for steps in (_FULL_STEPS, _SEARCHED_STEPS))
-    full = ca.rootfinder("full", "fast_newton", in_units, few)
-    searched = ca.rootfinder("searched", "newton", in_units, many)
-    brought = ca.fabs(ca.jacobian(g, z)) @ (ca.fabs(z) + unit)
-    is_root = ca.logic_all(ca.fabs(g) <= _ACCURACY * brought)
-    holds = ca.Function("holds", [z, others], [ca.substitute(is_root, z, unit * z)])
+    g, brought = (
+        ca.substitute(e, z, unit * z) for e in (g, ca.fabs(ca.jacobian(g, z)) @ (ca.fabs(z) + unit))
+    )
+    holds = ca.Function("holds", [z, others], [ca.logic_all(ca.fabs(g) <= _ACCURACY * brought)])
+    begin = ca.Function("begin", [others], [start / unit])
+    left = ca.SX.sym("left")  # of what g is at the start
+    partly = g - left * ca.substitute(g, z, start / unit)
+    direct = ca.rootfinder("direct", "fast_newton", {"x": z, "p": others, "g": g}, _NEWTON)
+    step = ca.rootfinder(
+        "step", "fast_newton", {"x": z, "p": ca.vertcat(others, left), "g": partly}, _NEWTON
+    )
 
-    p, begin = ca.MX.sym("p", others.numel()), ca.Function("begin", [others], [start / unit])
-    first = full(x0=begin(p), p=p)["x"]
-    near = ca.if_else(holds(first, p), first, searched(x0=begin(p), p=p)["x"], True)
-    last = full(x0=near, p=p)["x"]  # what it starts from has no derivative
+    p = ca.MX.sym("p", others.numel())
+    first = direct(x0=begin(p), p=p)["x"]
+    followed = begin(p)
+    for part in np.linspace(1.0, 0.0, _STAGES + 1)[1:]:
+        followed = step(x0=followed, p=ca.vertcat(p, part))["x"]
+    near = ca.if_else(holds(first, p), first, followed, True)
+    last = direct(x0=near, p=p)["x"]  # what it starts from has no derivative
     value = unit * last + ca.if_else(holds(last, p), 0.0, np.nan)
     # As one call: what is inside is neither searched for kinks nor written out again.
     return ca.Function("root", [p], [value], {"never_inline": True})
@@ -170,31 +178,46 @@ def _unit(start: ca.SX) -> float:
     return size if size > 0.0 and np.isfinite(size) else 1.0
 
 
-def singular_equation(
-    model: Model, symbols: tuple[ca.SX, ...], numbers: tuple[np.ndarray, ...]
-) -> str:
-    """Return the equation at which the Jacobian g_z is singular, in words; "" where none is.
+def refuse_unsolvable(
+    solution: AlgebraicSolution, p: ca.SX, points: list[tuple[np.ndarray | float, ...]]
+) -> None:
+    """Refuse equations that have no root, or a singular Jacobian, wherever they are looked at.
 
     Args:
-        model: with algebraic variables.
-        symbols: all others of the equations.
-        numbers: their values.
+        solution: the variables in terms of everything else.
+        p: parameters of the problem (n_p,).
+        points: values of x, u, t and p.
+
+    Raises:
+        ProblemError: naming the equation or the variable.
     """
-    start = ca.SX.zeros(model.nz) if model.z_guess is None else model.z_guess
-    slopes = ca.jacobian(model.algebraic, model.z)
-    at = ca.Function("slopes", list(symbols), [ca.substitute(slopes, model.z, start)])
-    jacobian = np.array(at(*numbers))
+    model = solution.model
+    slopes = ca.substitute(ca.jacobian(model.algebraic, model.z), model.z, model.z_start)
+    outputs = [ca.densify(slopes), ca.densify(solution.values)]
+    at = ca.Function("root", [model.x, model.u, model.t, p], outputs)
+    found = [[np.array(value) for value in at(*point)] for point in points]
+    singular = [row for jacobian, _ in found for row in _singular_rows(jacobian)]
+    if len(singular) == len(points):
+        raise ProblemError(
+            f"model '{model.name}': {_equation(model, singular[0])} does not determine a variable "
+            "of its own at the start: the Jacobian of the algebraic equations is singular there. "
+            f"{_LOWER_THE_INDEX}; if it is singular only at this z_guess, give another"
+        )
+    missing = [np.flatnonzero(~np.isfinite(values)) for _, values in found]
+    if all(rows.size for rows in missing):
+        row = int(missing[0][0])
+        raise ProblemError(
+            f"model '{model.name}': at the start no root of the algebraic equations is found for "
+            f"{model.z_names[row]} from z_guess; is there one, and near the guess?"
+        )
+
+
+def _singular_rows(jacobian: np.ndarray) -> list[int]:
+    """Return the row that depends on the others most, nothing where none does."""
     if not np.isfinite(jacobian).all():
-        return ""
+        return []
     for axis in (1, 0):
         most = np.abs(jacobian).max(axis=axis, keepdims=True)
         jacobian = jacobian / np.where(most > 0.0, most, 1.0)
     directions, values, _ = np.linalg.svd(jacobian)
-    if values[-1] > _SINGULAR:
-        return ""
-    row = int(np.abs(directions[:, -1]).argmax())
-    return (
-        f"{_equation(model, row)} does not determine a variable of its own at the start: the "
-        f"Jacobian of the algebraic equations is singular there. {_LOWER_THE_INDEX}; if it is so "
-        "only at this z_guess, give another"
-    )
+    return [int(np.abs(directions[:, -1]).argmax())] if values[-1] < _SINGULAR else []

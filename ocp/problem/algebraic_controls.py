@@ -11,7 +11,12 @@ import numpy as np
 
 from ocp.problem.algebraic import AlgebraicSolution
 from ocp.problem.constraint import Box, Constraint, unused
+from ocp.problem.first_evaluation import inside
+from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
+
+# Instants at which a guess is sampled.
+_INSTANTS = 21
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +72,22 @@ class AlgebraicControls:
             **(terms | {"constraints": (*terms["constraints"], equations)}),
             model=model,
             control_bounds=ocp.control_bounds & Box.unbounded(count),
-            guess=None,
+            guess=self._first_guess(),
         )
+
+    @property
+    def first_controls(self) -> np.ndarray:
+        """Controls of the original to begin with where a guess has none, (nu,)."""
+        return inside(self.written.control_bounds)
+
+    def _first_guess(self) -> Guess:
+        """Return the guess of the problem, or what its start makes of one, with the variables."""
+        ocp, at = self.written, np.linspace(0.0, 1.0, _INSTANTS)
+        given = Guess() if ocp.guess is None else ocp.guess
+        x, u = given.sample("x", at, ocp.model.nx), given.sample("u", at, ocp.model.nu)
+        u = np.tile(self.first_controls, (len(at), 1)) if u is None else u
+        duration = given.duration if ocp.has_free_time else None
+        return Guess(x=x, u=np.hstack([u, self.slacks(at, x, u)]), duration=duration)
 
     def slacks(self, fractions: np.ndarray, x: np.ndarray | None, u: np.ndarray) -> np.ndarray:
         """Return the variables that fit, (k, m); where there is no root, where it is looked for.
@@ -93,13 +112,11 @@ class AlgebraicControls:
         """(x, u, t, p) -> the variables, and where they are looked for."""
         ocp, own = self.original, list(self._linear.columns)
         m, written = ocp.model, self.written.model
-        assert written.z_guess is not None  # there are roots to look for
-        values = [self.written.algebraic_solution.values[own], written.z_guess[own]]
+        values = [self.written.algebraic_solution.values[own], written.z_start[own]]
         return ca.Function("variables", [m.x, m.u, m.t, ocp.p], [ca.densify(v) for v in values])
 
     @property
     def _sizes(self) -> np.ndarray:
         """Typical sizes: of the guess."""
-        fractions, ocp = np.array([0.0]), self.original
-        found = np.abs(self.slacks(fractions, None, np.zeros((1, ocp.model.nu))))[0]
+        found = np.abs(self.slacks(np.zeros(1), None, self.first_controls[None, :]))[0]
         return np.where(found > 0.0, found, 1.0)

@@ -77,7 +77,9 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     m = ocp.model
     discrete = m.is_discrete
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
-    yield f"{ocp.name}   ({m.name}: {_count(m.nx, 'state')}, {_count(m.nu, 'control')})"
+    counted = [_count(m.nx, "state"), _count(m.nu, "control")]
+    counted += [_count(m.nz, "algebraic variable")] * (m.nz > 0)
+    yield f"{ocp.name}   ({m.name}: {', '.join(counted)})"
     yield ""
     stage = f"sum k=0..{ocp.steps - 1} of L" if ocp.steps is not None else f"int 0..{tf} L dt"
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
@@ -87,6 +89,8 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     for name, row in zip(m.x_names, ca.vertsplit(m.f), strict=True):
         left = f"{name}[k+1]" if discrete else f"d({name})/dt"
         yield f"    {left} = {readable(row)}"
+    for name, row in zip(m.z_names, ca.vertsplit(m.algebraic), strict=True):
+        yield f"    0 = {readable(row)}   (algebraic, of {name} and others)"
     if ocp.has_free_time:
         box = ocp.time_box
         yield f"    {_between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"

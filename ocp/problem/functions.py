@@ -28,6 +28,7 @@ class Functions:
         terminal: terminal constraints psi, stacked.
         integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
+        algebraic: the algebraic variables (nz,).
     """
 
     rate: ca.Function
@@ -41,6 +42,7 @@ class Functions:
     terminal: ca.Function
     integrands: ca.Function
     invariants: ca.Function
+    algebraic: ca.Function
 
     @classmethod
     def of(
@@ -52,8 +54,12 @@ class Functions:
         terminal_cost: ca.SX,
         constraints: Sequence[Constraint],
         invariants: Sequence[Constraint],
+        algebraic: ca.SX,
     ) -> "Functions":
-        """Build them from the parts of a problem; p are all parameters and signals (n_p,)."""
+        """Build them from the parts of a problem without algebraic variables, and those.
+
+        p are all parameters and signals (n_p,).
+        """
         m, phi = model, terminal_cost
 
         def at(place: Place) -> ca.SX:
@@ -79,6 +85,7 @@ class Functions:
             terminal=at_an_end("terminal", psi),
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
+            algebraic=along("algebraic", algebraic),
         )
 
 

@@ -1,6 +1,6 @@
 """Where a solver starts: any part of a trajectory, from anywhere."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numeric, check_positive
 from ocp.checks.errors import ProblemError
+from ocp.problem.parameters import Unknown
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,3 +59,32 @@ class Guess:
         nodes = np.linspace(0.0, 1.0, len(rows))
         columns = [np.interp(fractions, nodes, c) for c in rows.T]
         return np.array(columns).reshape(width, len(fractions)).T
+
+
+def check_guess(owner: str, guess: object, unknowns: Iterable[Unknown]) -> None:
+    """Refuse what cannot be sampled, and values of what is no unknown constant; None is none.
+
+    Args:
+        owner: name of the problem.
+        guess: of a user.
+        unknowns: of the problem.
+
+    Raises:
+        ProblemError: naming what is wrong.
+    """
+    # A class has the method as well, but nothing to call it with.
+    if guess is not None and (isinstance(guess, type) or not hasattr(guess, "sample")):
+        raise ProblemError(
+            f"{owner}: the guess is {guess if isinstance(guess, type) else type(guess)}, "
+            "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
+        )
+    if not isinstance(guess, Guess):
+        return
+    entries = {entry.name: entry for entry in unknowns}
+    for name, value in guess.unknowns.items():
+        if name not in entries:
+            known = ", ".join(entries) or "none"
+            raise ProblemError(
+                f"{owner}: guess: '{name}' is no unknown constant; declared are: {known}"
+            )
+        entries[name].checked(value)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import (
+    Expression,
     check_column,
     check_symbols,
     element_names,
@@ -66,7 +67,7 @@ class Model(Portable):
     u_nominal: ArrayLike | None = None
     z: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     algebraic: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
-    z_guess: ca.SX | ArrayLike | None = None
+    z_guess: Expression | None = None
     z_units: tuple[str, ...] = ()
     u_is_change: bool = False
     start: ca.SX = field(default_factory=ca.SX)
@@ -122,7 +123,7 @@ class Model(Portable):
                 f"model '{self.name}': z_guess has {guess.numel()} rows, but there are {self.nz} "
                 "algebraic variables z"
             )
-        if not guess.is_regular():
+        if not all(e.is_regular() for e in ca.vertsplit(guess) if e.is_constant()):
             raise ProblemError(f"model '{self.name}': z_guess = {guess} is not finite")
         object.__setattr__(self, "z_guess", guess)
 
@@ -140,6 +141,11 @@ class Model(Portable):
     def nz(self) -> int:
         """Number of algebraic variables."""
         return self.z.numel()
+
+    @property
+    def z_start(self) -> ca.SX:
+        """Where a root of g is looked for (nz,); 0 where it does not matter."""
+        return ca.SX.zeros(self.nz) if self.z_guess is None else ca.SX(self.z_guess)
 
     @property
     def is_discrete(self) -> bool:
@@ -166,5 +172,5 @@ class Model(Portable):
         known = [self.x, self.u, self.t, parameters]
         refuse_foreign_symbols(self.f, [*known, self.z], f"model '{self.name}': f")
         refuse_foreign_symbols(self.algebraic, [*known, self.z], f"model '{self.name}': algebraic")
-        if self.z_guess is not None:
-            refuse_foreign_symbols(self.z_guess, known, f"model '{self.name}': z_guess")
+        if self.nz:
+            refuse_foreign_symbols(self.z_start, known, f"model '{self.name}': z_guess")

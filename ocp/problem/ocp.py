@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_scalar, element_names
-from ocp.problem.algebraic import AlgebraicSolution
+from ocp.problem.algebraic import AlgebraicSolution, refuse_unsolvable
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -24,7 +24,7 @@ from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
 from ocp.problem.functions import Functions
-from ocp.problem.guess import Guess
+from ocp.problem.guess import Guess, check_guess
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
@@ -37,6 +37,7 @@ from ocp.problem.parameters import (
 from ocp.problem.portable import Portable
 from ocp.problem.problem_checks import (
     check_distinct,
+    check_ends,
     check_free_start,
     check_start_inside,
     check_symbols,
@@ -250,15 +251,15 @@ class OCP(Portable):
     @cached_property
     def functions(self) -> Functions:
         """Dynamics, costs with soft prices, and constraints as Functions, built at first use."""
-        if self.model.nz:
-            return self.explicit.functions
+        plain = self.explicit
         return Functions.of(
-            self.model,
-            self.p,
-            running_cost=ca.SX(self.running_cost) + price(self.at("path")),
-            terminal_cost=ca.SX(self.terminal_cost) + price(self.at("terminal")),
-            constraints=self.constraints,
-            invariants=self.invariants,
+            plain.model,
+            plain.p,
+            running_cost=ca.SX(plain.running_cost) + price(plain.at("path")),
+            terminal_cost=ca.SX(plain.terminal_cost) + price(plain.at("terminal")),
+            constraints=plain.constraints,
+            invariants=plain.invariants,
+            algebraic=self.algebraic_solution.values,
         )
 
     @cached_property
@@ -349,25 +350,8 @@ class OCP(Portable):
             ProblemError: if it is nothing that can be sampled.
         """
         guess = self.guess if given is None else given
-        # A class has the method as well, but nothing to call it with.
-        if guess is not None and (isinstance(guess, type) or not hasattr(guess, "sample")):
-            raise ProblemError(
-                f"{self.name}: the guess is {guess if isinstance(guess, type) else type(guess)}, "
-                "a Guess(x=..., u=..., costate=..., duration=...) or a Solution is needed"
-            )
-        if isinstance(guess, Guess):
-            self._check_guessed_unknowns(guess)
+        check_guess(self.name, guess, self.unknowns)
         return guess
-
-    def _check_guessed_unknowns(self, guess: Guess) -> None:
-        entries = {entry.name: entry for entry in self.unknowns}
-        for name, value in guess.unknowns.items():
-            if name not in entries:
-                known = ", ".join(entries) or "none"
-                raise ProblemError(
-                    f"{self.name}: guess: '{name}' is no unknown constant; declared are: {known}"
-                )
-            entries[name].checked(value)
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
@@ -426,9 +410,12 @@ class OCP(Portable):
         self.start_box.sized(model.nx, f"{name}: bounds of the start")
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
-        terms = [model.f, *costs, *[c.expression for c in self.constraints]]
+        terms = [model.f, model.algebraic, *costs, *[c.expression for c in self.constraints]]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
+        if model.nz:
+            values = self.algebraic_solution.values
+            check_ends(name, model, values, costs[1], self.constraints, self.invariants)
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""
@@ -439,7 +426,10 @@ class OCP(Portable):
             for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
                 self.guess.sample(part, np.array([0.0]), width)
         p = self.parameter_values().at(0.0)[0]
-        faults = [fault_at(self, x0, u, p) for u in self._first_controls()]
+        controls = self._first_controls()
+        if model.nz:
+            refuse_unsolvable(self.algebraic_solution, self.p, [(x0, u, 0.0, p) for u in controls])
+        faults = [fault_at(self, x0, u, p) for u in controls]
         if all(faults):
             raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")
 

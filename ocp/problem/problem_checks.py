@@ -61,6 +61,38 @@ def check_symbols(
             raise ProblemError(f"{owner}: invariant '{c.name}' must hold at='path'")
 
 
+def check_ends(
+    owner: str,
+    model: Model,
+    values: ca.SX,
+    terminal_cost: ca.SX,
+    constraints: Iterable[Constraint],
+    invariants: Iterable[Constraint],
+) -> None:
+    """Refuse an algebraic variable that depends on a control where there is none.
+
+    Args:
+        owner: name of the problem.
+        model: its dynamics.
+        values: the algebraic variables in terms of everything else (nz,).
+        terminal_cost: it holds at the end.
+        constraints: of any place.
+        invariants: they contain no control.
+    """
+    each = zip(ca.vertsplit(model.z), ca.vertsplit(values), strict=True)
+    moved = [z for z, value in each if ca.depends_on(value, model.u)]
+    at_ends = [c for c in constraints if c.at in ("initial", "terminal")]
+    terms = [(f"{c.at} constraint '{c.name}'", c.expression) for c in at_ends]
+    terms += [(f"invariant '{c.name}'", c.expression) for c in invariants]
+    for what, expression in [("terminal_cost", terminal_cost), *terms]:
+        for z in moved:
+            if ca.depends_on(expression, z):
+                raise ProblemError(
+                    f"{owner}: {what} contains the algebraic variable {z}, which depends on a "
+                    "control; there is none at this place"
+                )
+
+
 def check_unknown_names(owner: str, unknowns: Iterable[Unknown], others: Sequence[str]) -> None:
     """Refuse an unknown constant whose symbol has the name of a state, or of another one."""
     taken = list(others)

@@ -5,7 +5,10 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ocp.problem.cache import once_per_problem
+from ocp.problem.constraint import Constraint
 from ocp.problem.constraint_rows import ConstraintRows, Violation
+from ocp.problem.ocp import OCP
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 from ocp.solution.solution import Solution
 
@@ -99,6 +102,28 @@ def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Viol
         yield rows.unknowns.largest_violation(np.concatenate(chosen)[None, :], t[:1])
     if len(rows.integral):
         yield rows.integral.largest_violation(integrals(solution, truth)[None, :], t[-1:])
+    if ocp.model.nz:
+        yield from _unsolved(solution, truth)
     yield Violation(
         float(ocp.time_box.excess(np.array([solution.duration]))[0]), rows.time, float(t[-1])
     )
+
+
+def _unsolved(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:
+    """Yield by how much the algebraic equations, as they are written, are not zero."""
+    rows, function = _equations(solution.problem)
+    for values, instants in zip(
+        _on_steps(function, truth, truth.ends), (truth.t[:-1], truth.t[1:]), strict=True
+    ):
+        yield rows.largest_violation(values, instants)
+
+
+@once_per_problem
+def _equations(ocp: OCP) -> tuple[ConstraintRows, ca.Function]:
+    """Return the algebraic equations as rows, and as a function of (x, u, t, p)."""
+    m = ocp.model
+    zero = np.zeros(m.nz)
+    written = Constraint("algebraic equations", m.algebraic, zero, zero)
+    values = ocp.algebraic_solution(m.algebraic)
+    function = ca.Function("equations", [m.x, m.u, m.t, ocp.p], [values])
+    return ConstraintRows.of((written,), "path", m), function

@@ -278,6 +278,24 @@ class Solution:
         values = np.array(law.map(len(points))(*[a.T for a in args])).T
         return values if times.ndim else values[0]
 
+    def algebraic(self, t: ArrayLike) -> np.ndarray:
+        """Return the algebraic variables at time(s) t [s], (nz,) or (len(t), nz).
+
+        They are those of state and control there, as the problem's own equations give them.
+        """
+        times = _instants(t, "algebraic")
+        points = np.atleast_1d(times)
+        p = self.data.values.at((points - self.t[0]) / self.duration)
+        given = (self.state(points), self.control(points), points[:, None], p)
+        along = self.problem.functions.algebraic.map(len(points))
+        values = np.array(along(*[a.T for a in given])).T
+        return values if times.ndim else values[0]
+
+    @property
+    def z(self) -> np.ndarray:
+        """The algebraic variables at the nodes, (N + 1, nz)."""
+        return self.algebraic(self.t)
+
     @cached_property
     def pieces(self) -> PiecewisePolynomial:
         """The polynomials of a control of that kind."""

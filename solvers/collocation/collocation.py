@@ -135,8 +135,8 @@ class Collocation(ScalingSolver):
         variables = AlgebraicControls(form.implicit)
         if not variables.is_needed:
             return super().build_form(form)
-        program = self.build_normal(variables.problem)
-        return self.judging(WithSlacks(variables), program)
+        rewriting = WithSlacks(variables, {"u": variables.first_controls})
+        return self.judging(rewriting, self.build_normal(variables.problem))
 
     def imposed(self, ocp: OCP) -> ImposedRows:
         """Return the rows of the problem, which hold at the points, not at the edges; see above.

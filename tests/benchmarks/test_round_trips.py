@@ -109,7 +109,18 @@ def with_soft_ends(ocp: OCP) -> OCP | None:
     return replace(ocp, constraints=soft)
 
 
+def with_rates_as_roots(ocp: OCP) -> OCP | None:
+    """The rates as algebraic variables: the first through an equation that has to be solved."""
+    m = ocp.model
+    z = ca.SX.sym("z", m.nx)
+    g = z - m.f
+    g[0] = z[0] ** 3 + z[0] - m.f[0] ** 3 - m.f[0]
+    model = replace(m, z=z, algebraic=g, f=z, z_guess=0.9 * m.f + 0.1)
+    return replace(ocp, model=model)
+
+
 POSED: dict[str, Pose] = {
+    "algebraic": with_rates_as_roots,
     "free start": with_free_start,
     "unknown parameters": with_unknown_parameters,
     "unknown time": with_unknown_time,
