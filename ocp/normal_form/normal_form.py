@@ -25,7 +25,9 @@ class NormalForm(Portable):
         unknowns: where unknown constants stand among its states, by name.
         integrals: where integrals stand among its states, by name of the constraint.
         start: where the state at the start stands among its states; nowhere where no term has it.
-        slacks: what the controls behind the own ones stand for, in terms of these.
+        slacks: what the last controls stand for, in terms of the original.
+        controls: where the own controls stand among its states and controls, (nu,).
+        rates: which of its controls are the rates of those that are states, in their order.
     """
 
     original: OCP
@@ -34,6 +36,12 @@ class NormalForm(Portable):
     integrals: dict[str, slice]
     start: slice
     slacks: ca.SX
+    controls: np.ndarray
+    rates: np.ndarray
+
+    def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the controls of the original (..., nu) for states and controls of the problem."""
+        return np.concatenate([x, u], axis=-1)[..., self.controls]
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -41,7 +49,7 @@ class NormalForm(Portable):
 
     @cached_property
     def slack(self) -> ca.Function:
-        """(x, u, t, p) -> the controls behind the own ones that fit, p that of the original."""
+        """(x, u, t, p) -> the slacks among the controls that fit, p that of the original."""
         m = self.original.model
         return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(self.slacks)])
 
@@ -57,4 +65,13 @@ def normal_form(ocp: OCP) -> NormalForm | None:
     integrals = add_integrals(draft)
     start = add_start(draft)
     unknowns = add_unknowns(draft)
-    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, slacks)
+    return NormalForm(
+        original=ocp,
+        problem=draft.problem(),
+        unknowns=unknowns,
+        integrals=integrals,
+        start=start,
+        slacks=slacks,
+        controls=draft.own_controls(),
+        rates=len(draft.kept) + np.arange(len(draft.moved)),
+    )

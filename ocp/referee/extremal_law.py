@@ -36,7 +36,9 @@ def extremal_law(ocp: OCP) -> ExtremalLaw:
     kind = symbol_type(conditions.flow)
     z, t, p = kind.sym("z", 2 * nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
     own = p[: inner.p.numel()]  # parameters come first, behind them what is a state there
-    u = conditions.control(z[:nx], z[nx:], t, own)[: ocp.model.nu]
+    u = conditions.control(z[:nx], z[nx:], t, own)
+    if form is not None:
+        u = ca.vertcat(z[:nx], u)[form.controls.tolist()]
     flow = conditions.flow(z, t, own)
     return ExtremalLaw(
         ca.Function("control", [z, t, p], [u], ["z", "t", "p"], ["u"]),

@@ -260,8 +260,9 @@ class Solution:
         signals of the problem are smooth between them.
         """
         times = _instants(t, "control")
-        if self.control_kind == "extremal" and self.normal is not None:
-            return self.normal.control(times)[..., : self.problem.model.nu]
+        form = normal_form(self.problem) if self.normal is not None else None
+        if self.control_kind == "extremal" and self.normal is not None and form is not None:
+            return form.own_controls(self.normal.state(times), self.normal.control(times))
         if self.control_kind == "held":
             index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
             return self.u[np.clip(index, 0, len(self.u) - 1)]
