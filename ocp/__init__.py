@@ -28,6 +28,7 @@ from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.rate import Rate
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work
 from ocp.solution.solver import InitialGuess, Program, Solver, solve
@@ -64,6 +65,7 @@ __all__ = [
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Rate",
     "Record",
     "Replay",
     "Rollout",

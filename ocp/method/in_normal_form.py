@@ -18,6 +18,8 @@ from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess
 
+_LAST = "last_input"
+
 
 @dataclass(frozen=True, eq=False)
 class InNormalForm(Rewriting):
@@ -44,7 +46,13 @@ class InNormalForm(Rewriting):
         start = self.problem.start().copy()
         start[: len(data.x0)] = data.x0
         start[self.form.start] = self.form.copied(data.x0)
+        if (last := data.values.named(_LAST)) is not None:
+            start[self.form.last_input] = last
         return start
+
+    def parameters(self, given: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike] | None:
+        """Return what is a parameter of the normal form too: the last input is a start there."""
+        return given and {name: value for name, value in given.items() if name != _LAST}
 
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess with what is added; of a solution all that it knows."""
@@ -60,12 +68,14 @@ class InNormalForm(Rewriting):
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""
         original, m = self.original, self.original.model
+        last = {} if original.last_input is None else {_LAST: found.x0[self.form.last_input]}
         return found.with_(
             problem=original,
             x=found.x[:, : m.nx],
             x0=found.x0[: m.nx],
             costate=found.costate[:, : m.nx],
             **own_controls(self.form, found),
+            parameters={**found.parameters, **last},
             unknowns={name: found.x[0, at] for name, at in self.form.unknowns.items()},
             normal=found,
         )
@@ -128,9 +138,10 @@ class _Added:
             if name in self.known:
                 whole[:, at] = self.known[name]
         u = self.given.sample("u", fractions, form.original.model.nu)
-        if u is not None:
-            is_state = form.controls < form.problem.model.nx
-            whole[:, form.controls[is_state]] = u[:, is_state]
+        if u is not None and len(rates := form.original.control_rates):
+            # Of a control that is a state itself; in discrete time of the one before.
+            before = u if len(form.rates) else np.vstack([u[:1], u[:-1]])
+            whole[:, form.last_input] = before[:, rates.index]
         if form.integrals and u is not None:
             along = self._along(form.original.functions.integrands, fractions, x, u)
             rates = np.split(along, np.cumsum([c.size for c in form.original.at("integral")]), 1)

@@ -146,6 +146,8 @@ class Draft:
             free_start=(*own, *added),
             start_bounds=start,
             unknowns=(),
+            rates=(),
+            last_input=None,
             smoothness=self.smoothness,
             guess=None,
         )

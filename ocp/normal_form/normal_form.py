@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import Draft
+from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
@@ -28,6 +29,7 @@ class NormalForm(Portable):
         slacks: what the last controls stand for, in terms of the original.
         controls: where the own controls stand among its states and controls, (nu,).
         rates: which of its controls are the rates of those that are states, in their order.
+        last_input: where the states stand that start at the last input.
     """
 
     original: OCP
@@ -38,6 +40,7 @@ class NormalForm(Portable):
     slacks: ca.SX
     controls: np.ndarray
     rates: np.ndarray
+    last_input: slice
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
@@ -58,9 +61,10 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    if not (ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
+    if not (ocp.unknowns or ocp.rates or ocp.at("integral") or ocp.refers_to_start or is_soft):
         return None
     draft = Draft.of(ocp)
+    last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
     start = add_start(draft)
@@ -74,4 +78,5 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         slacks=slacks,
         controls=draft.own_controls(),
         rates=len(draft.kept) + np.arange(len(draft.moved)),
+        last_input=last_input,
     )

@@ -195,11 +195,16 @@ class Solution:
 
     @property
     def sensitivity(self) -> dict[str, np.ndarray]:
-        """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs."""
-        if self.normal is None:
+        """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs.
+
+        Where controls have a ``Rate`` also of their ``"last_input"``; 0 where that is free.
+        """
+        form = None if self.normal is None else normal_form(self.problem)
+        if form is None or self.normal is None:
             return {}
-        form, costate = normal_form(self.problem), self.normal.costate[0]
-        return {} if form is None else {name: costate[at] for name, at in form.unknowns.items()}
+        costate = self.normal.costate[0]
+        last = {"last_input": costate[form.last_input]} if self.problem.rates else {}
+        return {name: costate[at] for name, at in form.unknowns.items()} | last
 
     @property
     def multipliers(self) -> dict[str, np.ndarray]:
