@@ -229,8 +229,8 @@ class FallbackLadder:
     def _back_up(self, last: np.ndarray | None, now: Instant) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
         size = self.applied.size(self.ocp)
-        if self.ocp.model.u_is_change:  # to hold is to change nothing
-            last = np.zeros(size)
+        if last is None and len(self.ocp.control_rates) == size:  # it is declared
+            last = np.asarray(self.ocp.last_input)
         given, reason = self.backup.input(*now, size=size, last=last)
         if given is None:
             return None, reason

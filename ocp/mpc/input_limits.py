@@ -47,10 +47,9 @@ class InputLimits:
     .. math:: \min_v \; |v - u|^2 \quad \text{s.t.} \quad \underline u \le v \le \overline u,
               \quad \underline d \le d(x, v, t, p) \le \overline d
 
-    for the rows d that limit the input (``Constraint.limits_input``): a bound that varies with
-    time, the actuator's own bound where the control is its rate; and for its change since the last
-    input, in continuous time divided by the interval. Where they exclude each other the bounds of
-    the input win.
+    for the rows d that limit the input (``Constraint.limits_input``), such as a bound that varies
+    with time, and for its change since the last input, in continuous time divided by the interval.
+    Where they exclude each other the bounds of the input win.
 
     Attributes:
         ocp: the problem.
@@ -94,8 +93,7 @@ class InputLimits:
             return inside
         is_known = np.isfinite(self._values(inside, at))
         if not is_known.all() and not (self._columns is not None and self.ocp.rates):
-            # Nobody knows where the actuator is: where the input moves it, it stays.
-            return bounds.clip(np.zeros_like(given)) if self.ocp.model.u_is_change else inside
+            return inside
         if self._columns is not None:
             return self._interval(bounds, at).clip(inside)
         # A start at which a slope vanishes, as the middle of a ring, leads nowhere: others may.

@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_positive
+from ocp.checks.arguments import check_instance, check_nominal, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import (
     check_column,
@@ -41,8 +41,6 @@ class Model(Portable):
         start: symbols of the state at the start (nx,), for costs and constraints that couple both
             ends of a trajectory, such as ``x - model.start`` at the end of a period; they are made
             by the model.
-        u_is_change: whether the controls are changes of what an actuator holds, see
-            ``with_input_rate``: to hold is then to send zero.
 
     Raises:
         ProblemError: naming the symbol and the shape that are wrong.
@@ -58,7 +56,6 @@ class Model(Portable):
     u_units: tuple[str, ...] = ()
     x_nominal: ArrayLike | None = None
     u_nominal: ArrayLike | None = None
-    u_is_change: bool = False
     start: ca.SX = field(default_factory=ca.SX)
 
     def __post_init__(self) -> None:
@@ -88,7 +85,6 @@ class Model(Portable):
                     f"model '{self.name}': {label}_units has {len(units)} entries "
                     f"for {size} symbols"
                 )
-        check_flag(self.u_is_change, f"model '{self.name}': u_is_change")
         for label, size in (("x_nominal", self.nx), ("u_nominal", self.nu)):
             what = f"model '{self.name}': {label}"
             object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))

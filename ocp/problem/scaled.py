@@ -65,7 +65,6 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         f=in_sizes(m.f, rounded.x),
         t=m.t,
         dt=m.dt,
-        u_is_change=m.u_is_change,
         start=m.start,
     )
     return ScaledOCP(

@@ -105,13 +105,8 @@ def test_every_rung_stays_within_the_rate(ocp, backup):
     law = (lambda x, t: [2.0 * (-1) ** round(t / 0.1)]) if backup == "wild" else backup
     inner = LinearMPC() if ocp.model.is_discrete else MultipleShooting(20)
     solver = Failing(inner, {0, 1, 2, *range(8, 14), 20})
-    mpc, x, before, seen = (
-        MPC(ocp=ocp, solver=solver, dt=0.1, backup=law),
-        np.array([1.0, 0]),
-        0.0,
-        set(),
-    )
-    rng = np.random.default_rng(0)
+    mpc, rng = MPC(ocp=ocp, solver=solver, dt=0.1, backup=law), np.random.default_rng(0)
+    x, before, seen = np.array([1.0, 0.0]), 0.0, set()
     for k in range(24):
         told = [np.nan, np.nan] if k in (5, 6, 15) else x + 0.3 * rng.normal(size=2)
         decision = mpc.step(told, 0.1 * k)
