@@ -10,7 +10,6 @@ from ocp.codegen.compile import Compiler, InterpretedWarning
 from ocp.files.archive import whole_arrays
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
-from ocp.linear.input_rate import with_input_rate
 from ocp.linear.stationary import with_stationary_end
 from ocp.linear.structure import linear_quadratic
 from ocp.linear.terminal_set import Polyhedron, terminal_set, with_terminal_set
@@ -28,6 +27,7 @@ from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.rate import Rate
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work
 from ocp.solution.solver import InitialGuess, Program, Solver, solve
@@ -64,6 +64,7 @@ __all__ = [
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Rate",
     "Record",
     "Replay",
     "Rollout",
@@ -91,7 +92,6 @@ __all__ = [
     "solve",
     "terminal_set",
     "whole_arrays",
-    "with_input_rate",
     "with_stationary_end",
     "with_terminal_set",
     "without_kinks",

@@ -49,7 +49,7 @@ from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
-from ocp.problem.refusal import refuse_free_ends
+from ocp.problem.refusal import refuse_free_ends, refuse_state_bounds
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.start_feasibility import start_violation
@@ -119,6 +119,7 @@ __all__ = [
     "node_widths",
     "normal_form",
     "refuse_free_ends",
+    "refuse_state_bounds",
     "replacing",
     "rewriting_of",
     "scaled",

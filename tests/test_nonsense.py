@@ -58,6 +58,7 @@ from ocp import (
     Plant,
     PlantInput,
     ProblemError,
+    Rate,
     Rollout,
     Solution,
     Status,
@@ -72,7 +73,6 @@ from ocp import (
     replay,
     saturated_lqr,
     solve,
-    with_input_rate,
     with_stationary_end,
 )
 from ocp.codegen.compile import c_code, compiled
@@ -339,9 +339,7 @@ CALLS: list[tuple[str, Wrong]] = [
     # Other functions of a problem.
     ("stationary: the matrices is an int", lambda: stationary(*[3])),
     ("with_stationary_end: the problem is an int", lambda: with_stationary_end(*[3])),
-    ("with_input_rate: the problem is an int", lambda: with_input_rate(*[3], rate=Box())),
-    ("with_input_rate: rate is a float",
-     lambda: with_input_rate(thesis_tracking(3), **{"rate": 1.0})),
+    ("Rate: control", lambda: Rate(*[3.0], lower=-1)),
     ("instantaneous: the problem is an int", lambda: instantaneous(*[3])),
     ("saturated_lqr: the problem is an int", lambda: saturated_lqr(*[3])),
     ("start_violation: the problem is an int", lambda: start_violation(*[3], answer().data)),

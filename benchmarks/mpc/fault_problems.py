@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from benchmarks.mpc.altered import Altered
 from benchmarks.mpc.faulty import Fault, Schedule, Spoiled, active
 from models import Disc, DistanceCost, PlanarArm, redundancy_ocp
-from ocp import MPC, OCP, Box, Constraint, Model, Parameter, Plant, PlantInput, with_input_rate
+from ocp import MPC, OCP, Box, Constraint, Model, Parameter, Plant, PlantInput, Rate
 from solvers import LinearMPC, MultipleShooting, PrioritisedKinematics, track
 
 MISMATCH = 0.3
@@ -45,13 +45,11 @@ class FaultProblem:
         mpc: the controller, its solver failing on the schedule.
         plant: the truth, another one on the schedule.
         x0: first state.
-        faulty_states: whose sensors may fail; None: all.
     """
 
     mpc: MPC
     plant: Plant
     x0: tuple[float, ...]
-    faulty_states: tuple[int, ...] | None = None
 
 
 def cart(faults: Schedule) -> FaultProblem:
@@ -154,15 +152,14 @@ def arm(faults: Schedule) -> FaultProblem:
 def heating(faults: Schedule) -> FaultProblem:
     """Return a room of two walls, heated by a valve that moves slowly, for a price.
 
-    The control is the change of the valve, at most 0.2 a step; the valve is between 0 and what the
-    boiler gives, which varies with time, the sum of both path constraints in rate form. The warmth
-    is limited softly. Nothing but the sensors of warmth fails: the valve knows where it is.
+    The valve is between 0 and what the boiler gives, which varies with time, and changes by at most
+    0.2 a step. The warmth is limited softly.
     """
     dt, x, u, t = 1.0, ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("t")
     target, limit = ca.SX.sym("target"), ca.SX.sym("wall")
     warmth, wall = x[0], x[1]
     supply = Constraint("supply", u - 1.0 - 0.4 * ca.sin(0.3 * t), upper=0.0, limits_input=True)
-    plain = OCP(
+    ocp = OCP(
         name="heating",
         model=Model(
             name="heating",
@@ -180,6 +177,8 @@ def heating(faults: Schedule) -> FaultProblem:
         control_bounds=Box(0.0, 1.5),
         constraints=(supply, Constraint("comfort", warmth - limit, upper=0.0)),
         parameters=(Parameter("target", target, 0.0), Parameter("wall", limit, 10.0)),
+        rates=(Rate(u, -0.2, 0.2, weight=0.01),),
+        last_input=[0.3],
     )
 
     def wanted(t: float, fault: Fault | None) -> Mapping[str, float]:
@@ -187,7 +186,6 @@ def heating(faults: Schedule) -> FaultProblem:
         blocked = fault is not None and fault.kind == "obstacle"
         return {"target": _NOWHERE if away else 0.0, "wall": 1.0 if blocked else 10.0}
 
-    ocp = with_input_rate(plain, rate=Box(-0.2, 0.2), weight=0.01)
     m = ocp.model
     truth = _other(
         ca.substitute(m.f, m.u, _GAIN * m.u),
@@ -195,7 +193,6 @@ def heating(faults: Schedule) -> FaultProblem:
         m.u,
         partial(_actual, faults, dt),
         dt=dt,
-        noise=[1e-4, 1e-4, 0.0],
     )
     return FaultProblem(
         mpc=MPC(
@@ -205,8 +202,7 @@ def heating(faults: Schedule) -> FaultProblem:
             parameters=lambda t: _known(wanted, faults, t, dt),
         ),
         plant=truth,
-        x0=(2.0, 1.5, 0.3),
-        faulty_states=(0, 1),
+        x0=(2.0, 1.5),
     )
 
 
@@ -240,7 +236,6 @@ def _other(
     parameters: Callable,
     *,
     dt: float | None = None,
-    noise: ArrayLike = 1e-4,
 ) -> Plant:
     ocp = OCP(
         name="plant",
@@ -250,4 +245,4 @@ def _other(
         running_cost=ca.sumsqr(u),
         parameters=(Parameter("gain", _GAIN, 1.0),),
     )
-    return Plant(ocp=ocp, parameters=parameters, measurement_noise=noise)
+    return Plant(ocp=ocp, parameters=parameters, measurement_noise=1e-4)

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.mpc.fault_problems import FaultProblem, arm, cart, heating
 from benchmarks.mpc.faulty import NEVER_OPTIMAL, Hindered, Schedule, active, schedule
-from benchmarks.mpc.followed import outside_limits
+from benchmarks.mpc.followed import before, outside_limits
 from ocp import MPC, Decision, FlightRecorder, InputSource, Rollout, closed_loop, replay_all
 
 SUBJECTS: Mapping[str, Callable[[Schedule], FaultProblem]] = {
@@ -96,7 +96,7 @@ def campaign(
 def _piece(name: str, steps: int, seed: int) -> FaultReport:
     faults = schedule(steps, seed)
     subject = SUBJECTS[name](faults)
-    mpc, hindered = subject.mpc, Hindered(subject.mpc, faults, subject.faulty_states)
+    mpc, hindered = subject.mpc, Hindered(subject.mpc, faults)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "flight"
         with FlightRecorder(mpc, file) as recorder:
@@ -121,7 +121,8 @@ def _judged(
         faults=Counter(fault.kind for fault in faults),
         sources=Counter((kind, d.source) for kind, d in zip(kinds, decisions, strict=True)),
         bad_inputs=sum(
-            _leaves_limits(subject.mpc, x, d) for x, d in zip(rollout.x, decisions, strict=False)
+            _leaves_limits(subject.mpc, x, d, last)
+            for x, d, last in zip(rollout.x, decisions, before(rollout), strict=False)
         ),
         unnamed=sum(d.source is not InputSource.OPTIMAL and not d.message for d in decisions),
         lies=sum(
@@ -135,7 +136,7 @@ def _judged(
     )
 
 
-def _leaves_limits(mpc: MPC, x: np.ndarray, decision: Decision) -> bool:
+def _leaves_limits(mpc: MPC, x: np.ndarray, decision: Decision, last: np.ndarray | None) -> bool:
     """Whether an input leaves its bounds, or a row that limits it in the true state."""
     if not np.isfinite(decision.input).all():
         return True
@@ -143,7 +144,7 @@ def _leaves_limits(mpc: MPC, x: np.ndarray, decision: Decision) -> bool:
         return True
     if mpc.applied.what == "rate":
         return False
-    return outside_limits(mpc.ocp, x, decision.input, decision.applies_at) > _ROUNDING
+    return outside_limits(mpc.ocp, x, decision, last) > _ROUNDING
 
 
 def _is_slow(rollout: Rollout, first: int) -> bool:

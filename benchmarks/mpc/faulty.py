@@ -117,12 +117,10 @@ class Hindered:
     Attributes:
         mpc: the controller.
         faults: the schedule.
-        faulty_states: whose sensors may fail; None: all.
     """
 
     mpc: MPC
     faults: Schedule = field(default=())
-    faulty_states: tuple[int, ...] | None = None
 
     @property
     def delay(self) -> float:
@@ -143,15 +141,12 @@ class Hindered:
         fault = active(self.faults, t, self.mpc.dt)
         if fault is None or fault.kind not in IN_SENSOR:
             return x
-        every = tuple(range(len(x)))
-        fails = np.isin(every, self.faulty_states or every)
         match fault.kind:
             case "nan measurement":
-                wrong = np.where(np.cumsum(fails) == 1, np.nan, x)
+                return np.append(np.nan, x[1:])
             case "absurd measurement":
-                wrong = np.full(len(x), np.copysign(_ABSURD, fault.size))
+                return np.full(len(x), np.copysign(_ABSURD, fault.size))
             case "outlier":
-                wrong = x + _OUTLIER * fault.size
+                return x + _OUTLIER * fault.size
             case _:
-                wrong = x + 2.0 * fault.size
-        return np.where(fails, wrong, x)
+                return x + 2.0 * fault.size

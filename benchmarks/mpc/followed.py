@@ -11,14 +11,16 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Decision,
     InputSource,
     Model,
     Plant,
+    Rate,
+    Rollout,
     Solver,
     Status,
     UnsupportedProblem,
     discretise,
-    with_input_rate,
 )
 from solvers import Collocation, LinearMPC, MultipleShooting, StagewiseNewton
 
@@ -86,19 +88,34 @@ def _loop(rng: np.random.Generator) -> FollowedLoop:
         solved=len(solved),
         followed=len(solved) - len(missed),
         outside=sum(
-            outside_limits(ocp, x, d.input, d.applies_at) > 1e-9
-            for x, d in zip(rollout.x, rollout.decisions, strict=False)
+            outside_limits(ocp, x, d, last) > 1e-9
+            for x, d, last in zip(rollout.x, rollout.decisions, before(rollout), strict=False)
         ),
         reason=missed[0].message if missed else rollout.ended,
     )
 
 
-def outside_limits(ocp: OCP, x: np.ndarray, u: np.ndarray, t: float) -> float:
-    """Return by how much an input leaves the rows that limit it; parameters are as declared."""
-    rows = ocp.rows.controls + ocp.rows.path.of_kind("input")
-    m, p = ocp.model, ocp.parameter_values().at(0.0)[0]
+def before(rollout: Rollout) -> list[np.ndarray | None]:
+    """Return what was decided before each decision of a loop; None before the first."""
+    return [None, *(d.input for d in rollout.decisions)]
+
+
+def outside_limits(ocp: OCP, x: np.ndarray, decision: Decision, last: np.ndarray | None) -> float:
+    """Return by how much an input leaves the rows that limit it; parameters are as declared.
+
+    Args:
+        ocp: in discrete time, where it limits rates.
+        x: state when the input acts (nx,).
+        decision: with the input.
+        last: the input before; None: as declared.
+    """
+    rows, rates = ocp.rows.controls + ocp.rows.path.of_kind("input"), ocp.control_rates
+    m, p, u = ocp.model, ocp.parameter_values().at(0.0)[0], decision.input
     values = ca.Function("limits", [m.x, m.u, m.t, ocp.p], [ca.densify(rows.expression)])
-    return float(rows.excess(np.array(values(x, u, t, p)).ravel()).max(initial=0.0))
+    excess = rows.excess(np.array(values(x, u, decision.applies_at, p)).ravel())
+    from_there = ocp.last_input if last is None else last[rates.index]
+    change = u[rates.index] - np.asarray(from_there) if len(rates) else np.empty(0)
+    return float(max(excess.max(initial=0.0), rates.box.excess(change).max(initial=0.0)))
 
 
 def _problem(rng: np.random.Generator, features: tuple[str, ...]) -> OCP:
@@ -137,8 +154,8 @@ def _problem(rng: np.random.Generator, features: tuple[str, ...]) -> OCP:
     if "rate" in features or rng.random() < 0.5:
         ocp = discretise(ocp, _DT)
     if "rate" in features:
-        bounds = Box(-float(rng.uniform(0.2, 1.0)), 1.0)
-        ocp = with_input_rate(ocp, rate=bounds, weight=0.01)
+        slowest = -float(rng.uniform(0.2, 1.0))
+        ocp = replace(ocp, rates=(Rate(u, slowest, 1.0, weight=0.01),), last_input=[0.0])
     return ocp
 
 

@@ -16,6 +16,7 @@ from ocp.checks.arguments import (
 from ocp.checks.errors import ProblemError
 from ocp.closed_loop.model_rollout import ModelRollout
 from ocp.problem.constraint import Box
+from ocp.problem.constraint_rows import Violation
 from ocp.problem.ocp import OCP
 
 
@@ -97,6 +98,7 @@ class RunningPlant:
         steps = 1 if discrete else plant.substeps
         self._model = ModelRollout(plant.ocp, steps, control_at_end=not discrete)
         self._declared = plant.ocp.parameter_values().at(0.0)[0]
+        self._last_input = plant.ocp.last_input
 
     def measure(self) -> np.ndarray:
         """Return the state as the sensors have it (nx,)."""
@@ -116,11 +118,27 @@ class RunningPlant:
         times = self.t + np.linspace(0.0, dt, self._model.n + 1)
         p = np.array([self._parameters(t) for t in times])
         trial = self._model.of(self.x, self._acted(given, times), times, (p[:-1], p[1:]))
+        price, of_rate = self._rated(given, dt)
         self.x, self.t = trial.x[-1], float(times[-1])
         noise = np.asarray(plant.process_noise)
         if noise.any():
             self.x = self.x + np.sqrt(dt) * noise * self._rng.standard_normal(len(self.x))
-        return trial.cost, trial.excess, trial.worst
+        excess, worst = max((trial.excess, trial.worst), (of_rate.amount, str(of_rate)))
+        return trial.cost + price, excess, worst
+
+    def _rated(self, given: np.ndarray, dt: float) -> tuple[float, Violation]:
+        """Return what the change since the last input (m,) costs, and by how much it is too fast.
+
+        In continuous time a sampled input counts as if it moved on during the interval dt [s].
+        """
+        ocp, rates = self.plant.ocp, self.plant.ocp.control_rates
+        if not len(rates):
+            return 0.0, Violation()
+        now, length = given[rates.index], 1.0 if ocp.model.is_discrete else dt
+        last = now if self._last_input is None else np.asarray(self._last_input)
+        rate, self._last_input = (now - last) / length, now
+        found = ocp.rows.rates.largest_violation(rate[None, :], np.array([self.t]))
+        return float(rates.weight @ rate**2) * length, found
 
     def _parameters(self, t: float) -> np.ndarray:
         """Return all parameters and signals at an instant, stacked (n_p,)."""
@@ -130,9 +148,10 @@ class RunningPlant:
         missing = [e.name for e in entries if e.name not in now]
         if missing:
             raise ProblemError(f"plant: no value of {', '.join(missing)} at t = {t:g} s")
-        return np.concatenate(
+        told = np.concatenate(
             [check_numbers(now[e.name], e.symbol.numel(), f"plant: '{e.name}'") for e in entries]
         )
+        return np.append(told, self._declared[len(told) :])
 
     def _acted(self, given: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Return what the actuators do in each substep (substeps, m)."""

@@ -44,6 +44,12 @@ def discretise(ocp: OCP, dt: float) -> OCP:
         raise ProblemError(f"{ocp.name}: the model is discrete already")
     if ocp.has_free_time:
         raise UnsupportedProblem(f"{ocp.name}: a free final time has no number of steps")
+    for name in ocp.control_rates.names:
+        raise UnsupportedProblem(
+            f"{ocp.name}: the {name}: held controls jump, which has no rate in continuous time; "
+            "discretise without it, then limit the change per step: "
+            "replace(discrete, rates=(Rate(u, lower * dt, upper * dt, weight / dt),))"
+        )
     check_positive(dt, f"{ocp.name}: dt [s]")
     steps = _whole(ocp.duration / dt, f"{ocp.name}: the horizon of {ocp.duration:g} s", dt)
     terms = read_terms(ocp)

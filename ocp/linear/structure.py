@@ -43,7 +43,7 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
     Raises:
         UnsupportedProblem: naming the term that is not linear or quadratic, or the weight that
             is indefinite with its eigenvalue; for a continuous model, which ``discretise``
-            makes discrete; for a start on a manifold.
+            makes discrete; for a start on a manifold, and a ``Rate``.
     """
     check_instance(ocp, OCP, "linear_quadratic: the problem")
     if not ocp.model.is_discrete:
@@ -53,6 +53,11 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
     if not ocp.model.nu:
         raise UnsupportedProblem(f"{ocp.name}: the linear solvers need a control, there is none")
     refuse_free_start(ocp, "a linear solver")
+    for name in ocp.control_rates.names:
+        raise UnsupportedProblem(
+            f"{ocp.name}: the {name} is no part of A, B, Q, R: LinearMPC and Riccati take it by "
+            "themselves; to read matrices, write the last input as a state"
+        )
     lq = _assemble(ocp, read_terms(ocp))
     complaint = lq.sample_matrices(lq.declared).indefinite()
     if complaint:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import cumulative_trapezoid
 
 from ocp.checks.errors import ProblemError
+from ocp.method.own_controls import own_controls
 from ocp.method.rewriting import Rewriting, RewrittenGuess
 from ocp.normal_form.normal_form import NormalForm
 from ocp.problem.guess import Guess
@@ -16,6 +17,8 @@ from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess
+
+_LAST = "last_input"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,13 @@ class InNormalForm(Rewriting):
         start = self.problem.start().copy()
         start[: len(data.x0)] = data.x0
         start[self.form.start] = self.form.copied(data.x0)
+        if (last := data.values.named(_LAST)) is not None:
+            start[self.form.last_input] = last
         return start
+
+    def parameters(self, given: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike] | None:
+        """Return what is a parameter of the normal form too: the last input is a start there."""
+        return given and {name: value for name, value in given.items() if name != _LAST}
 
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess with what is added; of a solution all that it knows."""
@@ -59,12 +68,14 @@ class InNormalForm(Rewriting):
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""
         original, m = self.original, self.original.model
+        last = {} if original.last_input is None else {_LAST: found.x0[self.form.last_input]}
         return found.with_(
             problem=original,
             x=found.x[:, : m.nx],
             x0=found.x0[: m.nx],
             costate=found.costate[:, : m.nx],
-            u=found.u[:, : m.nu],
+            **own_controls(self.form, found),
+            parameters={**found.parameters, **last},
             unknowns={name: found.x[0, at] for name, at in self.form.unknowns.items()},
             normal=found,
         )
@@ -102,10 +113,21 @@ class _Added:
             case "x":
                 more = self._states(fractions, values)
             case "u":
-                more = self._slacks(fractions, values)
+                return self._controls(fractions, values)
             case _:
                 more = np.zeros((len(values), self.form.problem.model.nx - values.shape[1]))
-        return np.hstack([values, np.where(np.isfinite(more), more, 0.0)])
+        return np.hstack([values, _finite(more)])
+
+    def _controls(self, fractions: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the controls that are left, rates of the others, and slacks."""
+        form, times = self.form, fractions * self._duration
+        is_state = form.controls < form.problem.model.nx
+        moved = u[:, is_state]
+        rates = np.zeros_like(moved)
+        if moved.size and len(u) > 1:
+            with np.errstate(all="ignore"):  # instants may coincide
+                rates = np.gradient(moved, times, axis=0)
+        return np.hstack([u[:, ~is_state], _finite(rates), _finite(self._slacks(fractions, u))])
 
     def _states(self, fractions: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the added states: constants, and integrals along the guess."""
@@ -116,6 +138,10 @@ class _Added:
             if name in self.known:
                 whole[:, at] = self.known[name]
         u = self.given.sample("u", fractions, form.original.model.nu)
+        if u is not None and len(rates := form.original.control_rates):
+            # Of a control that is a state itself; in discrete time of the one before.
+            before = u if len(form.rates) else np.vstack([u[:1], u[:-1]])
+            whole[:, form.last_input] = before[:, rates.index]
         if form.integrals and u is not None:
             along = self._along(form.original.functions.integrands, fractions, x, u)
             rates = np.split(along, np.cumsum([c.size for c in form.original.at("integral")]), 1)
@@ -143,3 +169,8 @@ class _Added:
     @property
     def _duration(self) -> float:
         return self.given.duration or self.form.original.duration
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    """Return values with 0 for what is no number."""
+    return np.where(np.isfinite(values), values, 0.0)

@@ -126,6 +126,7 @@ def _mentioned(solution: Solution, verdict: Evaluation) -> Iterator[Violation]:
             continue
         excess = rows.excess(values)
         size = np.maximum(np.abs(values).max(axis=0), _bounds(rows))
+        size = np.where(np.isfinite(size), size, 1.0)
         exempt = excess <= _MENTIONED * np.maximum(size, _ZERO * _sizes_of_rows(solution, rows))
         yield rows.largest_violation(values, instants, exempt=exempt)
 
@@ -143,6 +144,9 @@ def _sizes_of_rows(solution: Solution, rows: ConstraintRows) -> np.ndarray:
     own = solution.problem.rows
     if rows is own.states or rows is own.start:
         return sizes.x
+    if rows is own.rates:
+        unit = 1.0 if solution.problem.model.is_discrete else solution.duration
+        return sizes.u[solution.problem.control_rates.index] / unit
     return sizes.of_rows(rows)
 
 

@@ -33,6 +33,10 @@ class Rewriting(ABC):
         """Return the start (nx,) in terms of the method, for a run of the original."""
         return data.x0
 
+    def parameters(self, given: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike] | None:
+        """Return parameters in terms of the method, of those of a run of the original."""
+        return given
+
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess in terms of the method, for one of a run of the original."""
         return given
@@ -77,7 +81,7 @@ class RewrittenProgram(Program):
         found = self.program.run(
             x0=self.rewriting.start(data),
             t0=t0,
-            parameters=parameters,
+            parameters=self.rewriting.parameters(parameters),
             guess=None if given is None else self.rewriting.guess(given, data),
         )
         answer = self.rewriting.answer(found)

@@ -79,12 +79,14 @@ def saturated_lqr(ocp: OCP, *, dt: float | None = None) -> ParametricLaw:
 
 
 def _endless(ocp: OCP, dt: float | None) -> OCP:
-    """Return one interval of the problem without its end and constraints, its signals at rest."""
+    """Return one interval of the problem without its end and constraints, its signals at rest.
+
+    Nor does it know rates: whatever acts is moved within them.
+    """
     now = tuple(
-        Parameter(entry.name, entry.symbol, np.asarray(entry.value)[0])
-        if isinstance(entry, Signal)
-        else entry
-        for entry in ocp.parameters
+        entry if isinstance(entry, Parameter) else Parameter(entry.name, entry.symbol, value)
+        for entry in ocp.given
+        for value in [entry.value[0] if isinstance(entry, Signal) else entry.value]
     )
     return replace(
         ocp,
@@ -93,6 +95,8 @@ def _endless(ocp: OCP, dt: float | None) -> OCP:
         constraints=(),
         state_bounds=Box(),
         parameters=now,
+        rates=(),
+        last_input=None,
         guess=None,
     )
 

@@ -229,8 +229,8 @@ class FallbackLadder:
     def _back_up(self, last: np.ndarray | None, now: Instant) -> Rung:
         """Take the input of the backup law, or the last one where it may be held."""
         size = self.applied.size(self.ocp)
-        if self.ocp.model.u_is_change:  # to hold is to change nothing
-            last = np.zeros(size)
+        if last is None and len(self.ocp.control_rates) == size:  # it is declared
+            last = np.asarray(self.ocp.last_input)
         given, reason = self.backup.input(*now, size=size, last=last)
         if given is None:
             return None, reason
@@ -243,6 +243,11 @@ class FallbackLadder:
         # for second-order terms.
         middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
         u = plan_controls(plan, now.t + middle)
+        rates = self.ocp.control_rates
+        if len(rates) and not self.ocp.model.is_discrete:
+            # Where the next plan begins: it may change by the whole rate in an interval.
+            u = u.copy()
+            u[rates.index] = plan_controls(plan, now.t + self.dt)[rates.index]
         return self._bounded(self._input_map(now.x, u, now.t, now.p), source, now, plan)
 
     def _bounded(
@@ -301,7 +306,7 @@ class FallbackLadder:
 
     @cached_property
     def _input_limits(self) -> InputLimits:
-        return InputLimits(self.ocp, self.applied)
+        return InputLimits(self.ocp, self.applied, self.dt)
 
     def prepare(self) -> None:
         """Build what a step may need, so that no step waits for it."""

@@ -88,7 +88,7 @@ class FlightRecorder:
     def _begin(self) -> None:
         """Write the first line: only the loop tells the controller what acts at first."""
         mpc, acting = self._mpc, self._mpc.state.initial_input
-        names = tuple(entry.name for entry in mpc.ocp.parameters)
+        names = tuple(entry.name for entry in mpc.ocp.given)
         said = None if acting is None else acting.tolist()
         write_file(self.path, Header(mpc.ocp.name, repr(mpc.solver), names, said).line)
         with self._file:  # of the file that was there

@@ -42,23 +42,25 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class InputLimits:
-    r"""Bounds of the input, and the path constraints that limit it.
+    r"""Bounds of the input and of its rate, and the path constraints that limit it.
 
     .. math:: \min_v \; |v - u|^2 \quad \text{s.t.} \quad \underline u \le v \le \overline u,
               \quad \underline d \le d(x, v, t, p) \le \overline d
 
-    for the rows d that limit the input (``Constraint.limits_input``): a bound that varies with
-    time, the actuator's own bound where the control is its rate. Where they exclude each other
-    the bounds of the input win.
+    for the rows d that limit the input (``Constraint.limits_input``), such as a bound that varies
+    with time, and for its change since the last input, in continuous time divided by the interval.
+    Where they exclude each other the bounds of the input win.
 
     Attributes:
         ocp: the problem.
         applied: what the plant receives; of a rate the path constraints, which are those of the
             controls, say nothing.
+        dt: sampling interval [s].
     """
 
     ocp: OCP
     applied: PlantInput
+    dt: float
 
     def nearest(self, given: np.ndarray, at: Instant) -> np.ndarray:
         """Return the input (m,) within all limits that is nearest to the given one.
@@ -76,7 +78,8 @@ class InputLimits:
     def _rows_hold(self, given: np.ndarray, at: Instant) -> bool:
         if not self._rows:
             return True
-        slack = 0.0 if self._columns is not None else _SOLVED
+        is_exact = self._columns is not None and not self.ocp.rates
+        slack = 0.0 if is_exact else _SOLVED
         return bool(self._rows.excess(self._values(given, at)).max(initial=0.0) <= slack)
 
     def _values(self, u: np.ndarray, at: Instant) -> np.ndarray:
@@ -88,9 +91,9 @@ class InputLimits:
         inside = bounds.clip(given)
         if not self._rows or self._rows_hold(inside, at):
             return inside
-        if not np.isfinite(self._values(inside, at)).all():
-            # Nobody knows where the actuator is: where the input moves it, it stays.
-            return bounds.clip(np.zeros_like(given)) if self.ocp.model.u_is_change else inside
+        is_known = np.isfinite(self._values(inside, at))
+        if not is_known.all() and not (self._columns is not None and self.ocp.rates):
+            return inside
         if self._columns is not None:
             return self._interval(bounds, at).clip(inside)
         # A start at which a slope vanishes, as the middle of a ring, leads nowhere: others may.
@@ -131,7 +134,7 @@ class InputLimits:
         box = self._rows.box
         for i, j in enumerate(self._columns):
             slope = slopes[j, i]
-            if slope == 0.0:
+            if slope == 0.0 or not np.isfinite(slope + offset[i]):
                 continue
             ends = (np.array([box.lower, box.upper])[:, i] - offset[i]) / slope
             lower[j] = max(lower[j], ends.min())
@@ -146,8 +149,8 @@ class InputLimits:
 
     @cached_property
     def _rows(self) -> ConstraintRows:
-        """The path constraints that limit the input."""
-        rows = self.ocp.rows.path.of_kind("input")
+        """The path constraints that limit the input, and what limits its change."""
+        rows = self.ocp.rows.path.of_kind("input") + _changes(self.ocp, self.dt)
         return rows if self.applied.what == "control" else rows.where(np.zeros(len(rows)))
 
     @cached_property
@@ -188,3 +191,13 @@ class InputLimits:
         """Build what a step may need, so that no step waits for it."""
         if self._rows and self._columns is None:
             _ = self._nearest
+
+
+def _changes(ocp: OCP, dt: float) -> ConstraintRows:
+    """Return the bounds of the rates as rows of the input and the last one, which is in p."""
+    rates = ocp.control_rates
+    if not len(rates):
+        return ConstraintRows((), ca.SX(0, 1))
+    last, index = ocp.given[-1].symbol, rates.index.tolist()
+    rate = (ocp.model.u[index] - last) / (1.0 if ocp.model.is_discrete else dt)
+    return ConstraintRows(ocp.rows.rates.rows, rate)

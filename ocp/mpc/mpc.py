@@ -204,6 +204,15 @@ class MPC:
                 f"MPC of {name}: the integral constraint '{integrals[0].name}' would begin anew at "
                 "every step: carry the integral as a state, bounded at the end"
             )
+        if self.ocp.rates and self.ocp.last_input is None:
+            raise UnsupportedProblem(
+                f"MPC of {name}: the last input is free, here it is what was applied; say what it "
+                "is before the first step: last_input=..."
+            )
+        if self.ocp.rates and self.applied.what != "control":
+            raise UnsupportedProblem(
+                f"MPC of {name}: the rates are those of controls, and no control is applied"
+            )
         if self.ocp.refers_to_start:
             raise UnsupportedProblem(
                 f"MPC of {name}: a term contains the state at the start, which every step moves"

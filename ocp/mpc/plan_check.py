@@ -13,6 +13,7 @@ from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.fingerprint import differing, fingerprint
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
+from ocp.solution.control_rate import limited_rates
 from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 from ocp.solution.status import Status
@@ -109,10 +110,11 @@ class PlanCheck:
             if not self._is_constrained:
                 return 0.0, ""
             u = plan_controls(plan, plan.t[:-1])
-            return self._own_rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
+            found = self._own_rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
+            return max(found, self._of_rates(plan))
         if plan.status not in _USABLE:
             return np.inf, plan.status.value
-        return self.remainder(plan, start, t, p)
+        return max(self.remainder(plan, start, t, p), self._of_rates(plan))
 
     def violation(
         self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
@@ -130,9 +132,19 @@ class PlanCheck:
         result = model.of(start, u, plan.t, between)
         if not isfinite(result.excess):
             return PlanViolation(np.inf, np.inf, result.worst)
-        inputs, _ = self._input_rollout(len(u)).excess(result.x, u, plan.t, between)
+        found = self._input_rollout(len(u)).excess(result.x, u, plan.t, between)
+        inputs = max(found, self._of_rates(plan))
         end = model.end_excess(result.x[-1], plan.t[-1], p.at(plan.t[-1]))
-        return PlanViolation(inputs, *max((result.excess, result.worst), end))
+        return PlanViolation(inputs[0], *max((result.excess, result.worst), inputs, end))
+
+    def _of_rates(self, plan: Solution) -> tuple[float, str]:
+        """Return the largest violation of a bound of a rate by a plan, and its name."""
+        rows = self.imposed.rows.rates
+        if not rows.is_imposed:
+            return 0.0, ""
+        sizes = self.imposed.sizes and self.imposed.sizes.controls[self.ocp.control_rates.index]
+        found = rows.largest_violation(*limited_rates(plan, plan.t), sizes=sizes)
+        return found.relative, str(found)
 
     def _foreign(self, plan: Solution, start: np.ndarray, t: float) -> str:
         """Return in what a solver's answer is not one to the question; empty where it is."""
@@ -217,7 +229,8 @@ class PlanCheck:
     def _is_constrained(self) -> bool:
         """Whether there is anything along the way that a plan could violate."""
         rows = self.imposed.rows
-        return any(part.is_imposed for part in (rows.path, rows.states, rows.controls))
+        parts = (rows.path, rows.states, rows.controls, rows.rates)
+        return any(part.is_imposed for part in parts)
 
 
 def _are_near(begun: list[float], asked: list[float]) -> bool:

@@ -108,20 +108,26 @@ class InputCollector:
         self, state: ControllerState, t: float, given: Mapping[str, ArrayLike] | None
     ) -> tuple[HorizonParameters, str]:
         """Return the parameters of a horizon from t [s] on, or those of the last plan and why."""
-        start, unknown = t, ""
+        start, unknown, last = t, "", self._last_input(state)
         if given is not None or self.parameters is None:
-            values = self.ocp.parameter_values(given)
+            values = self.ocp.parameter_values({**last, **given} if given else last)
         else:
             try:
-                values = self.ocp.parameter_values(_told(self.parameters, t))
+                told = _told(self.parameters, t)
+                values = self.ocp.parameter_values({**last, **told} if last else told)
             except CALLBACK_ERRORS as error:
                 if state.input is None:  # the plant has not moved yet: let it be corrected
                     raise
                 unknown = f"no parameters from t = {t:g} s on: {error}"
                 start, known = (state.plan.t[0], state.plan.parameters) if state.plan else (t, None)
-                values = self.ocp.parameter_values(known)
+                values = self.ocp.parameter_values({**known, **last} if known else last)
         by_name = values.as_dict() if values.entries else {}
         return HorizonParameters(values, by_name, start, self.ocp.duration), unknown
+
+    def _last_input(self, state: ControllerState) -> dict[str, np.ndarray]:
+        """Return what was applied last, where a rate counts from it; before all as declared."""
+        rates, last = self.ocp.control_rates, state.last_input
+        return {"last_input": last[rates.index]} if len(rates) and last is not None else {}
 
     def _next_state(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the model's state one interval after t [s] under an input, parameters held."""

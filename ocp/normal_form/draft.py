@@ -1,4 +1,7 @@
-"""A problem while it is rewritten: its own states and controls, and what is added behind them."""
+"""A problem while it is rewritten: its own states and controls, and what is added behind them.
+
+A control may become a state: it keeps its symbol, so that no expression changes.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -22,6 +25,7 @@ class AddedStates:
         is_free: whether the optimiser chooses the start.
         box: bounds of the start, each (m,).
         size: typical sizes (m,).
+        bounds: all along the way; None: none.
     """
 
     symbol: ca.SX
@@ -30,6 +34,7 @@ class AddedStates:
     is_free: bool
     box: Box
     size: np.ndarray
+    bounds: Box | None = None
 
     @classmethod
     def constant(
@@ -79,6 +84,7 @@ class Draft:
         smoothness: of it.
         states: added ones.
         controls: added ones.
+        moved: controls of its own that are states now: where each one stands among all states.
     """
 
     ocp: OCP
@@ -88,6 +94,7 @@ class Draft:
     smoothness: int
     states: list[AddedStates] = field(default_factory=list)
     controls: list[AddedControls] = field(default_factory=list)
+    moved: dict[int, int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, ocp: OCP) -> "Draft":
@@ -105,17 +112,28 @@ class Draft:
         self.states.append(added)
         return slice(first, first + added.symbol.numel())
 
+    @property
+    def kept(self) -> list[int]:
+        """Which controls of the problem are controls still."""
+        return [i for i in range(self.ocp.model.nu) if i not in self.moved]
+
+    def own_controls(self) -> np.ndarray:
+        """Return where the problem's controls stand among all states and controls, (nu,)."""
+        nx = self.ocp.model.nx + sum(s.symbol.numel() for s in self.states)
+        at = {i: nx + k for k, i in enumerate(self.kept)} | self.moved
+        return np.array([at[i] for i in range(self.ocp.model.nu)], dtype=int)
+
     def problem(self) -> OCP:
         """Return the rewritten problem."""
         ocp, m = self.ocp, self.ocp.model
         own = [name for name, free in zip(m.x_names, ocp.start_is_free, strict=True) if free]
         added = [str(e) for s in self.states if s.is_free for e in ca.vertsplit(s.symbol)]
-        start, controls = ocp.start_bounds, ocp.control_bounds
+        start, states, controls = ocp.start_bounds, ocp.state_bounds, ocp.control_bounds[self.kept]
         for s in self.states:
             start = start & s.box
+            states = states & (s.bounds or Box.unbounded(s.symbol.numel()))
         for c in self.controls:
             controls = controls & c.box
-        count = sum(s.symbol.numel() for s in self.states)
         return replace(
             ocp,
             model=self._model(),
@@ -123,27 +141,29 @@ class Draft:
             running_cost=self.running_cost,
             terminal_cost=self.terminal_cost,
             control_bounds=controls,
-            state_bounds=ocp.state_bounds & Box.unbounded(count),
+            state_bounds=states,
             constraints=tuple(self.constraints),
             free_start=(*own, *added),
             start_bounds=start,
             unknowns=(),
+            rates=(),
+            last_input=None,
             smoothness=self.smoothness,
             guess=None,
         )
 
     def _model(self) -> Model:
-        m, sizes = self.ocp.model, sizes_of(self.ocp)
+        m, sizes, kept = self.ocp.model, sizes_of(self.ocp), self.kept
         states, controls = [s.symbol for s in self.states], [c.symbol for c in self.controls]
         more_x, more_u = (sum(s.numel() for s in each) for each in (states, controls))
         return replace(
             m,
             x=ca.vertcat(m.x, *states),
-            u=ca.vertcat(m.u, *controls),
+            u=ca.vertcat(m.u[kept, :], *controls),
             f=ca.vertcat(m.f, *[s.rate for s in self.states]),
             x_units=(*m.x_units, *[""] * more_x) if m.x_units else (),
-            u_units=(*m.u_units, *[""] * more_u) if m.u_units else (),
+            u_units=(*(m.u_units[i] for i in kept), *[""] * more_u) if m.u_units else (),
             x_nominal=np.concatenate([sizes.x, *[s.size for s in self.states]]),
-            u_nominal=np.concatenate([sizes.u, *[c.size for c in self.controls]]),
+            u_nominal=np.concatenate([sizes.u[kept], *[c.size for c in self.controls]]),
             start=ca.SX(),
         )

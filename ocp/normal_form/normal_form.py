@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import Draft
+from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
@@ -25,7 +26,10 @@ class NormalForm(Portable):
         unknowns: where unknown constants stand among its states, by name.
         integrals: where integrals stand among its states, by name of the constraint.
         start: where the state at the start stands among its states; nowhere where no term has it.
-        slacks: what the controls behind the own ones stand for, in terms of these.
+        slacks: what the last controls stand for, in terms of the original.
+        controls: where the own controls stand among its states and controls, (nu,).
+        rates: which of its controls are the rates of those that are states, in their order.
+        last_input: where the states stand that start at the last input.
     """
 
     original: OCP
@@ -34,6 +38,13 @@ class NormalForm(Portable):
     integrals: dict[str, slice]
     start: slice
     slacks: ca.SX
+    controls: np.ndarray
+    rates: np.ndarray
+    last_input: slice
+
+    def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the controls of the original (..., nu) for states and controls of the problem."""
+        return np.concatenate([x, u], axis=-1)[..., self.controls]
 
     @property
     def problem(self) -> OCP:
@@ -46,7 +57,7 @@ class NormalForm(Portable):
 
     @cached_property
     def slack(self) -> ca.Function:
-        """(x, u, t, p) -> the controls behind the own ones that fit, p that of the original."""
+        """(x, u, t, p) -> the slacks among the controls that fit, p that of the original."""
         m, slacks = self.original.model, self.original.algebraic_solution(self.slacks)
         return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(slacks)])
 
@@ -55,11 +66,23 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    if not (ocp.model.nz or ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
+    added = ocp.model.nz or ocp.unknowns or ocp.rates or ocp.at("integral") or is_soft
+    if not (added or ocp.refers_to_start):
         return None
     draft = Draft.of(ocp)
+    last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
     start = add_start(draft)
     unknowns = add_unknowns(draft)
-    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, slacks)
+    return NormalForm(
+        original=ocp,
+        problem=draft.problem(),
+        unknowns=unknowns,
+        integrals=integrals,
+        start=start,
+        slacks=slacks,
+        controls=draft.own_controls(),
+        rates=len(draft.kept) + np.arange(len(draft.moved)),
+        last_input=last_input,
+    )

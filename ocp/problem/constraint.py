@@ -50,6 +50,10 @@ class Box(Portable):
         """Return the box of both vectors, one behind the other; both are sized."""
         return Box(np.append(self.lower, other.lower), np.append(self.upper, other.upper))
 
+    def __getitem__(self, index: list[int]) -> "Box":
+        """Return the box of some components; it is sized."""
+        return Box(np.asarray(self.lower)[index], np.asarray(self.upper)[index])
+
     @classmethod
     def unbounded(cls, size: int) -> "Box":
         """Return a box (size,) that bounds nothing."""

@@ -243,6 +243,7 @@ class ProblemRows:
         terminal: at the end.
         integral: of the integrals over the horizon.
         invariants: what the exact dynamics keep; no method imposes them.
+        rates: bounds of the rates of controls; from the last input on.
         time: the bounds of the duration [s].
     """
 
@@ -255,6 +256,7 @@ class ProblemRows:
     terminal: ConstraintRows
     integral: ConstraintRows
     invariants: ConstraintRows
+    rates: ConstraintRows
     time: ConstraintRow
 
     def softened(self) -> "ProblemRows":

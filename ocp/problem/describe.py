@@ -11,6 +11,7 @@ from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.model import Model
 from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.rate import ControlRates
 
 
 class _Problem(Protocol):
@@ -65,6 +66,12 @@ class _Problem(Protocol):
     def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
+    def control_rates(self) -> ControlRates: ...
+
+    @property
+    def last_input(self) -> ArrayLike | None: ...
+
+    @property
     def parameters(self) -> tuple[Parameter | Signal, ...]: ...
 
 
@@ -98,6 +105,7 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield from _bounds(ocp.start_bounds, tuple(f"{n}(0)" for n in m.x_names), m.x_units)
     yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
     yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
+    yield from _rates(ocp)
     for c in ocp.constraints:
         yield from _constraint(c, c.at)
     for c in ocp.invariants:
@@ -107,6 +115,19 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     for entry in ocp.parameters:
         symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
         yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
+
+
+def _rates(ocp: _Problem) -> Iterable[str]:
+    """Say how fast controls may change, at what price, and from where on."""
+    m, rates = ocp.model, ocp.control_rates
+    bounds = np.asarray(rates.box.lower), np.asarray(rates.box.upper)
+    for i, (k, low, high, w) in enumerate(zip(rates.index, *bounds, rates.weight, strict=True)):
+        name = m.u_names[k]
+        change = f"{name}[k] - {name}[k-1]" if m.is_discrete else f"d({name})/dt"
+        last = ocp.last_input
+        said = [f"at {w:g} ({change})^2"] if w > 0.0 else []
+        said += ["last input free" if last is None else f"last input {np.asarray(last)[i]:g}"]
+        yield f"    {_between(low, change, high)}   ({', '.join(said)})"
 
 
 def _unknown(entry: Unknown) -> str:

@@ -58,6 +58,9 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
             parts[name] = np.concatenate([parts[name], *bounds])
     if ocp.unknowns:
         parts["unknown constants"] = np.concatenate([_stacked(e.box) for e in ocp.unknowns])
+    if len(rates := ocp.control_rates):
+        is_given = [ocp.last_input is not None]
+        parts["rates"] = np.concatenate([rates.index, _stacked(rates.box), rates.weight, is_given])
     return parts
 
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_positive
+from ocp.checks.arguments import check_instance, check_nominal, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import (
     Expression,
@@ -48,8 +48,6 @@ class Model(Portable):
         z_guess: where a root of g is looked for, numbers (nz,) or an expression in x, u, t and
             parameters; needed where g is not linear in z. Of several roots it says which is meant.
         z_units: a unit for each algebraic variable.
-        u_is_change: whether the controls are changes of what an actuator holds, see
-            ``with_input_rate``: to hold is then to send zero.
 
     Raises:
         ProblemError: naming the symbol and the shape that are wrong.
@@ -69,7 +67,6 @@ class Model(Portable):
     algebraic: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     z_guess: Expression | None = None
     z_units: tuple[str, ...] = ()
-    u_is_change: bool = False
     start: ca.SX = field(default_factory=ca.SX)
 
     def __post_init__(self) -> None:
@@ -101,7 +98,6 @@ class Model(Portable):
                     f"model '{self.name}': {label}_units has {len(units)} entries "
                     f"for {size} symbols"
                 )
-        check_flag(self.u_is_change, f"model '{self.name}': u_is_change")
         for label, size in (("x_nominal", self.nx), ("u_nominal", self.nu)):
             what = f"model '{self.name}': {label}"
             object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))

@@ -28,6 +28,7 @@ from ocp.problem.guess import Guess, check_guess
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
+    LastInput,
     Parameter,
     ParameterValues,
     Signal,
@@ -39,11 +40,13 @@ from ocp.problem.problem_checks import (
     check_distinct,
     check_ends,
     check_free_start,
+    check_rates,
     check_start_inside,
     check_symbols,
     check_unknown_names,
     check_used,
 )
+from ocp.problem.rate import ControlRates, Rate
 from ocp.problem.soft import price
 
 
@@ -77,6 +80,10 @@ class OCP(Portable):
             referee reports how far a solution strays.
         parameters: constants and sampled signals that may change from run to run.
         unknowns: constants that the optimiser chooses.
+        rates: how fast controls may change, and what that costs.
+        last_input: what the controls that have a ``Rate`` were just before the start, in their
+            order in the model (m,): the rate holds from there on. It is a run argument,
+            ``run(parameters={"last_input": ...})``; None: the optimiser chooses it.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -98,6 +105,8 @@ class OCP(Portable):
     invariants: tuple[Constraint, ...] = ()
     parameters: tuple[Parameter | Signal, ...] = ()
     unknowns: tuple[Unknown, ...] = ()
+    rates: tuple[Rate, ...] = ()
+    last_input: ArrayLike | None = None
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -117,6 +126,7 @@ class OCP(Portable):
         set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
         set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
         self._check_horizon()
+        self._check_last_input()
         self._check_terms()
         self._check_start()
 
@@ -129,9 +139,27 @@ class OCP(Portable):
 
     @cached_property
     def entries(self) -> tuple[Entry, ...]:
-        """What stands in p: parameters and signals, unknown constants, the state at the start."""
+        """What stands in p: parameters and signals, last input, unknown constants, the start."""
         start = (StartValue(self.model.start, self.start()),) if self.refers_to_start else ()
-        return (*self.parameters, *self.unknowns, *start)
+        return (*self.given, *self.unknowns, *start)
+
+    @cached_property
+    def given(self) -> tuple[Parameter | Signal | LastInput, ...]:
+        """What a run gives by name: parameters and signals, and the last input."""
+        if self.last_input is None:
+            return self.parameters
+        names = [self.model.u_names[i] for i in self.control_rates.index]
+        last = ca.vertcat(*[ca.SX.sym(f"last {name}") for name in names])
+        return (*self.parameters, LastInput(last, np.asarray(self.last_input)))
+
+    @property
+    def control_rates(self) -> ControlRates:
+        """The rates, stacked in the order of the controls."""
+        return self._control_rates
+
+    @cached_property
+    def _control_rates(self) -> ControlRates:
+        return ControlRates.of(self.name, self.model, self.rates)
 
     @cached_property
     def refers_to_start(self) -> bool:
@@ -281,8 +309,14 @@ class OCP(Portable):
             terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
             integral=ConstraintRows.of(self.at("integral"), "integral", m),
             invariants=ConstraintRows.of(self.invariants, "path", m),
+            rates=self._rate_rows(),
             time=ConstraintRow("final time", "time", 0, lower, upper),
         )
+
+    def _rate_rows(self) -> ConstraintRows:
+        rates = self.control_rates
+        symbols = ca.vertcat(ca.SX(0, 1), *[ca.SX.sym(name) for name in rates.names])
+        return ConstraintRows.of_bounds(rates.box, symbols, rates.names, kind="input")
 
     def _unknown_rows(self) -> ConstraintRows:
         none = ConstraintRows((), ca.SX(0, 1))
@@ -376,6 +410,7 @@ class OCP(Portable):
             ("invariants", Constraint),
             ("parameters", (Parameter, Signal)),
             ("unknowns", Unknown),
+            ("rates", Rate),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")
@@ -401,10 +436,24 @@ class OCP(Portable):
                 "a number of steps, a whole one, and no duration"
             )
 
+    def _check_last_input(self) -> None:
+        rates, what = self.control_rates, f"{self.name}: last_input"
+        check_rates(self.name, rates, self.model)
+        if self.last_input is None:
+            return
+        if not len(rates):
+            raise ProblemError(f"{what} is given, but no control has a Rate")
+        last = check_numbers(self.last_input, len(rates), what)
+        object.__setattr__(self, "last_input", last)
+        outside = self.control_bounds[rates.index.tolist()].excess(last)
+        for i in np.flatnonzero(outside > 0.0):
+            name = self.model.u_names[rates.index[i]]
+            raise ProblemError(f"{what}[{i}] = {last[i]} is outside the bounds of {name}")
+
     def _check_terms(self) -> None:
         name, model = self.name, self.model
         check_distinct(name, "constraint", [c.name for c in (*self.constraints, *self.invariants)])
-        check_distinct(name, "parameter", [e.name for e in (*self.parameters, *self.unknowns)])
+        check_distinct(name, "parameter", [e.name for e in (*self.given, *self.unknowns)])
         free = self.start_is_free
         check_free_start(name, model.x_names, self.free_start, self.start_bounds, free)
         self.start_box.sized(model.nx, f"{name}: bounds of the start")

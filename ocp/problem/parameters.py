@@ -126,6 +126,21 @@ class StartValue(_Constant):
 
 
 @dataclass(frozen=True, eq=False)
+class LastInput(_Constant):
+    """What the controls with a ``Rate`` were before the start of a run.
+
+    Args:
+        symbol: ``SX`` column (m,).
+        value: as declared (m,).
+    """
+
+    symbol: ca.SX
+    value: np.ndarray
+    name: str = "last_input"
+    kind: ClassVar[str] = "last input"
+
+
+@dataclass(frozen=True, eq=False)
 class Signal(Portable):
     """A reference sampled over the horizon, at N + 1 equally spaced instants.
 
@@ -194,7 +209,7 @@ class Signal(Portable):
 
 
 # What stands in the vector p of a problem.
-Entry = Parameter | Signal | Unknown | StartValue
+Entry = Parameter | Signal | LastInput | Unknown | StartValue
 
 
 @dataclass(frozen=True)
@@ -265,4 +280,9 @@ class ParameterValues:
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""
         each = zip(self.entries, self.values, strict=True)
-        return {e.name: v for e, v in each if isinstance(e, Parameter | Signal)}
+        return {e.name: v for e, v in each if isinstance(e, Parameter | Signal | LastInput)}
+
+    def named(self, name: str) -> np.ndarray | None:
+        """Return the value of one entry; None where there is none of that name."""
+        each = zip(self.entries, self.values, strict=True)
+        return next((value for entry, value in each if entry.name == name), None)

@@ -10,6 +10,7 @@ from ocp.checks.expressions import element_names, refuse_foreign_symbols
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.model import Model
 from ocp.problem.parameters import Unknown
+from ocp.problem.rate import ControlRates
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
 _ROUNDING = 1e-9
@@ -118,6 +119,17 @@ def check_used(owner: str, unknowns: Sequence[Unknown], terms: Sequence[ca.SX]) 
                     f"{owner}: unknown constant '{entry.name}' ({symbol}) appears in no "
                     "dynamics, cost or constraint: nothing decides its value"
                 )
+
+
+def check_rates(owner: str, rates: ControlRates, model: Model) -> None:
+    """Refuse a rate of a control that has the name of a state, or of another control."""
+    for i in rates.index:
+        name = model.u_names[i]
+        if (*model.x_names, *model.u_names).count(name) > 1:
+            raise ProblemError(
+                f"{owner}: a Rate of control '{name}': another symbol is called so as well; give "
+                "it a name of its own"
+            )
 
 
 def check_free_start(

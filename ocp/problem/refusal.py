@@ -1,4 +1,6 @@
-"""Refusal of free starts and durations by methods that go step by step from a given start."""
+"""Refusal of what some methods do not take: free starts and durations, bounds of states."""
+
+import numpy as np
 
 from ocp.checks.errors import UnsupportedProblem
 from ocp.problem.ocp import OCP
@@ -18,3 +20,13 @@ def refuse_free_start(ocp: OCP, method: str) -> None:
         raise UnsupportedProblem(
             f"{ocp.name}: {method} takes no free start ('{named[0]}'), it needs one that is given"
         )
+
+
+def refuse_state_bounds(ocp: OCP, method: str) -> None:
+    """Raise ``UnsupportedProblem`` on bounds of states, naming one that is bounded."""
+    box, m = ocp.state_bounds, ocp.model
+    for i in np.flatnonzero(np.isfinite(box.lower) | np.isfinite(box.upper)):
+        name = m.x_names[i]
+        is_control = f"rate of {name}" in m.u_names
+        why = ", which the bounds of a control with a Rate are" if is_control else ""
+        raise UnsupportedProblem(f"{ocp.name}: {method} takes no state bounds ('{name}'){why}")

@@ -20,6 +20,7 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRo
 from ocp.problem.model import Model
 from ocp.problem.nominal_sizes import Sizes, nominal_sizes
 from ocp.problem.ocp import OCP
+from ocp.problem.rate import Rate
 
 InSizes = Callable[[ca.SX | float, np.ndarray | float], ca.SX]
 
@@ -64,7 +65,6 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         f=in_sizes(m.f, rounded.x),
         t=m.t,
         dt=m.dt,
-        u_is_change=m.u_is_change,
         start=m.start,
     )
     return ScaledOCP(
@@ -83,6 +83,8 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         start_bounds=_box(ocp.start_bounds, rounded.x),
         parameters=ocp.parameters,
         unknowns=ocp.unknowns,
+        rates=_rates(ocp, rounded),
+        last_input=_last_input(ocp, rounded.u),
         smoothness=ocp.smoothness,
         original=ocp,
         sizes=rounded,
@@ -129,6 +131,7 @@ class ScaledOCP(OCP):
             initial=_with_units(rows.initial, of_constraint["initial"]),
             terminal=_with_units(rows.terminal, of_constraint["terminal"]),
             integral=_with_units(rows.integral, of_constraint["integral"]),
+            rates=_with_units(rows.rates, sizes.u[self.control_rates.index]),
         )
 
 
@@ -161,6 +164,20 @@ def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray, cost: float
         limits_input=c.limits_input,
         soft=None if c.soft is None else c.soft.per(sizes, cost),
     )
+
+
+def _rates(ocp: OCP, sizes: Sizes) -> tuple[Rate, ...]:
+    rates = ocp.control_rates
+    if not len(rates):
+        return ()
+    u, box = sizes.u[rates.index], _box(rates.box, sizes.u[rates.index])
+    weight = rates.weight * u**2 / sizes.cost
+    return (Rate(ocp.model.u[rates.index.tolist()], box.lower, box.upper, weight),)
+
+
+def _last_input(ocp: OCP, sizes: np.ndarray) -> np.ndarray | None:
+    last = ocp.last_input
+    return None if last is None else np.asarray(last) / sizes[ocp.control_rates.index]
 
 
 def _box(box: Box, sizes: np.ndarray) -> Box:

@@ -201,9 +201,9 @@ class ExtremalControls(ControlIntegrator):
         def rate(y: Any, s: Any) -> Any:  # SX or MX, as the control is closed or implicit
             """d(x, cost, z)/ds; the control is that of z, not of x."""
             at, p = t + s * h, interpolate(p0, p1, s)
-            u, flow = law(y[nx + 1 :], at, p)
-            plant = (functions.rate(y[:nx], u, at, p), functions.running_cost(y[:nx], u, at, p))
-            return h * ca.vertcat(*plant, flow)
+            u, flow, price = law(y[nx + 1 :], at, p)
+            cost = functions.running_cost(y[:nx], u, at, p) + price
+            return h * ca.vertcat(functions.rate(y[:nx], u, at, p), cost, flow)
 
         end = RK4()(rate, ca.vertcat(x, 0, begin), 0.0, 1.0)
         x_next, cost, z_next = end[:nx], end[nx], end[nx + 1 :]
@@ -257,12 +257,12 @@ _extremal = once_per_problem(ExtremalControls.of)
 
 
 def _control_of_time(known: ExtremalLaw) -> ca.Function:
-    """(z, t, p) -> the minimising control and dz/dt, through which no derivative passes.
+    """(z, t, p) -> minimising control, dz/dt, price of rates, through which no derivative passes.
 
     What is applied is a function of time; and where the control is an implicit root that was
     not found, its derivative does not exist.
     """
     flow = known.flow
     inputs = [symbol_type(flow).sym(flow.name_in(i), flow.sparsity_in(i)) for i in range(3)]
-    outputs = [known.control(*inputs), flow(*inputs)]
+    outputs = [known.control(*inputs), flow(*inputs), known.price(*inputs)]
     return ca.Function("law", inputs, outputs, {"is_diff_in": [False] * 3})

@@ -12,6 +12,7 @@ from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoin
 from ocp.referee.segments import defects, gaps, growth, worth
 from ocp.referee.stationarity import final_costate, stationarity
 from ocp.referee.violation import invariant_drift, largest_violation
+from ocp.solution.control_rate import price_of_rates
 from ocp.solution.solution import Solution
 
 # Accepted error of the cost, relative to its size.
@@ -23,7 +24,8 @@ class Evaluation:
     """The verdict on a solution.
 
     Attributes:
-        cost: true cost, inf if the controls make the state blow up, or no method resolves it.
+        cost: true cost, inf if the controls make the state blow up, or no method resolves it, or
+            one jumps whose ``Rate`` has a price.
         cost_error: bound of the error of the cost: from integrations of other accuracy and, by
             segments, what the gaps are worth by the solution's costates; inf where not known.
         violation: largest violation of any bound or constraint, between the nodes too.
@@ -87,14 +89,15 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
     truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
         return _lost(truth)
-    violation = largest_violation(solution, truth)
+    violation, price = largest_violation(solution, truth), price_of_rates(solution)
+    worst = "a control jumps that has a Rate" if np.isinf(price) else ""
     in_open_loop = truth.replay == "open loop"
     gap = None if in_open_loop else float(gaps(solution, truth).max())
     return Evaluation(
-        cost=truth.cost,
+        cost=truth.cost + price,
         cost_error=truth.cost_error + (0.0 if in_open_loop else worth(solution, truth)),
         violation=violation.amount,
-        worst=violation.where if violation.amount > 0.0 else "",
+        worst=violation.where if violation.amount > 0.0 else worst,
         stationarity=_stationarity(solution, truth),
         task_drift=invariant_drift(solution, truth),
         defect=float(defects(solution, truth).max()) if gap is None else gap,

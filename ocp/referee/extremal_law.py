@@ -21,10 +21,12 @@ class ExtremalLaw(NamedTuple):
     Attributes:
         control: (z, t, p) -> the minimising control (nu,).
         flow: (z, t, p) -> dz/dt.
+        price: (z, t, p) -> what the rates of the controls cost per second.
     """
 
     control: ca.Function
     flow: ca.Function
+    price: ca.Function
 
 
 @once_per_problem
@@ -36,11 +38,15 @@ def extremal_law(ocp: OCP) -> ExtremalLaw:
     kind = symbol_type(conditions.flow)
     z, t, p = kind.sym("z", 2 * nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
     own = p[: inner.p.numel()]  # parameters come first, behind them what is a state there
-    u = conditions.control(z[:nx], z[nx:], t, own)[: ocp.model.nu]
+    u, price = conditions.control(z[:nx], z[nx:], t, own), kind(0)
+    if form is not None:
+        price = ca.dot(ca.DM(ocp.control_rates.weight), u[form.rates.tolist()] ** 2)
+        u = ca.vertcat(z[:nx], u)[form.controls.tolist()]
     flow = conditions.flow(z, t, own)
     return ExtremalLaw(
         ca.Function("control", [z, t, p], [u], ["z", "t", "p"], ["u"]),
         ca.Function("flow", [z, t, p], [flow], ["z", "t", "p"], ["rate"]),
+        ca.Function("price", [z, t, p], [price]),
     )
 
 

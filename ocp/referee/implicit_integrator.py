@@ -266,7 +266,8 @@ def _extremal_rate(ocp: OCP) -> ca.Function:
     at, p = t + s * h, interpolate(p0, p1, s)
     now = (w[:nx], known.control(w[nx:], at, p), at, p)
     flow = known.flow(w[nx:], at, p)
-    rates = [h * ca.vertcat(functions.rate(*now), flow), h * functions.running_cost(*now)]
+    cost = functions.running_cost(*now) + known.price(w[nx:], at, p)
+    rates = [h * ca.vertcat(functions.rate(*now), flow), h * cost]
     return ca.Function("rate", [w, s, ca.vertcat(t, h, p0, p1)], rates)
 
 

@@ -10,6 +10,7 @@ from ocp.problem.constraint import Constraint
 from ocp.problem.constraint_rows import ConstraintRows, Violation
 from ocp.problem.ocp import OCP
 from ocp.referee.reference_trajectory import ReferenceTrajectory
+from ocp.solution.control_rate import limited_rates
 from ocp.solution.solution import Solution
 
 
@@ -71,6 +72,8 @@ def values_along(
     yield rows.states, truth.x, truth.t
     for values, instants in path_values(solution, truth):
         yield rows.path, values, instants
+    if rows.rates.is_imposed:
+        yield rows.rates, *limited_rates(solution, truth.t)
 
 
 def values_at_ends(

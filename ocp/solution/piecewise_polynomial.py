@@ -72,6 +72,21 @@ def bernstein(coefficients: np.ndarray, s: np.ndarray) -> np.ndarray:
     return rows[:, 0]
 
 
+def antiderivative(coefficients: np.ndarray, widths: np.ndarray, values: np.ndarray) -> np.ndarray:
+    r"""Return the coefficients (K, m + 1) of what has given polynomials as its derivative.
+
+    .. math:: U_0 = u(t_k), \quad U_{i+1} = U_i + \tfrac{h_k}{m} c_i, \quad U_m = u(t_{k+1})
+
+    Args:
+        coefficients: c of the derivative, (K, m).
+        widths: h of the pieces [s], (K,).
+        values: where the pieces meet, (K + 1,): it is continuous, whatever rounding did to the sum.
+    """
+    m = coefficients.shape[1]
+    inside = values[:-1, None] + np.cumsum(widths[:, None] / m * coefficients[:, :-1], axis=1)
+    return np.hstack([values[:-1, None], inside, values[1:, None]])
+
+
 def elevated(coefficients: np.ndarray, count: int) -> np.ndarray:
     r"""Return the same polynomial with more Bernstein coefficients.
 

@@ -195,11 +195,16 @@ class Solution:
 
     @property
     def sensitivity(self) -> dict[str, np.ndarray]:
-        """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs."""
-        if self.normal is None:
+        """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs.
+
+        Where controls have a ``Rate`` also of their ``"last_input"``; 0 where that is free.
+        """
+        form = None if self.normal is None else normal_form(self.problem)
+        if form is None or self.normal is None:
             return {}
-        form, costate = normal_form(self.problem), self.normal.costate[0]
-        return {} if form is None else {name: costate[at] for name, at in form.unknowns.items()}
+        costate = self.normal.costate[0]
+        last = {"last_input": costate[form.last_input]} if self.problem.rates else {}
+        return {name: costate[at] for name, at in form.unknowns.items()} | last
 
     @property
     def multipliers(self) -> dict[str, np.ndarray]:
@@ -260,8 +265,9 @@ class Solution:
         signals of the problem are smooth between them.
         """
         times = _instants(t, "control")
-        if self.control_kind == "extremal" and self.normal is not None:
-            return self.normal.control(times)[..., : self.problem.model.nu]
+        form = normal_form(self.problem) if self.normal is not None else None
+        if self.control_kind == "extremal" and self.normal is not None and form is not None:
+            return form.own_controls(self.normal.state(times), self.normal.control(times))
         if self.control_kind == "held":
             index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
             return self.u[np.clip(index, 0, len(self.u) - 1)]

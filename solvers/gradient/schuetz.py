@@ -27,6 +27,7 @@ from ocp.internal import (
     check_not_negative,
     check_whole,
     refuse_free_ends,
+    refuse_state_bounds,
 )
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
 from solvers.gradient.descent_direction import DescentStep, DirectionRule, search_direction
@@ -119,8 +120,7 @@ class Schuetz(ScalingSolver):
 def _refuse_constraints(ocp: OCP) -> None:
     for c in ocp.constraints:
         raise UnsupportedProblem(f"{ocp.name}: Schuetz takes no {c.at} constraint ('{c.name}')")
-    if ocp.state_bounds.is_active:
-        raise UnsupportedProblem(f"{ocp.name}: Schuetz takes no state bounds")
+    refuse_state_bounds(ocp, "Schuetz")
     refuse_free_ends(ocp, "Schuetz")
 
 

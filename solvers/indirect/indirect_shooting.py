@@ -16,6 +16,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    refuse_state_bounds,
 )
 from solvers.indirect.boundary_value_problem import ExtremalProblem
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation, advanced
@@ -89,8 +90,7 @@ class IndirectShooting(ScalingSolver):
             raise UnsupportedProblem(
                 f"{ocp.name}: indirect shooting takes no path constraint ('{c.name}')"
             )
-        if ocp.state_bounds.is_active:
-            raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no state bounds")
+        refuse_state_bounds(ocp, "indirect shooting")
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-self.steps // self.segments)

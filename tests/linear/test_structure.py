@@ -23,10 +23,9 @@ from ocp import (
     evaluate,
     linear_quadratic,
     solve,
-    with_input_rate,
 )
 from ocp.problem.run_data import RunData
-from solvers import LinearMPC, MultipleShooting, Riccati
+from solvers import MultipleShooting, Riccati
 from tests.linear.problems import general
 
 X, U = ca.SX.sym("x", 2), ca.SX.sym("u")
@@ -177,24 +176,3 @@ def test_signals_between_samples_and_time_are_refused():
     gain = replace(ocp, running_cost=ocp.running_cost * (2 + ocp.parameters[0].symbol))
     with pytest.raises(UnsupportedProblem, match="Q depends on w"):
         discretise(gain, 0.25)
-
-
-# -- input rate ---------------------------------------------------------------------------
-
-
-def test_input_rate_is_bounded_from_the_first_step():
-    ocp = problem(control_bounds=Box(-3.0, 3.0))
-    limited = with_input_rate(ocp, rate=Box(-0.5, 0.5), previous=1.0)
-    solution = solve(limited, LinearMPC())
-    applied = np.append(1.0, solution.x[1:, 2])
-    assert np.abs(np.diff(applied)).max() <= 0.5 + 1e-6
-    assert np.abs(applied).max() <= 3.0 + 1e-6
-    assert solution.cost > solve(ocp, LinearMPC()).cost
-    free = solve(with_input_rate(ocp, rate=Box(), previous=1.0), LinearMPC())
-    assert free.cost == pytest.approx(solve(ocp, LinearMPC()).cost, rel=1e-9)
-    weighed = solve(with_input_rate(ocp, rate=Box(), weight=1.0), LinearMPC())
-    assert weighed.cost > free.cost
-    with pytest.raises(ProblemError, match="negative"):
-        with_input_rate(ocp, rate=Box(), weight=-1.0)
-    with pytest.raises(UnsupportedProblem, match="discrete"):
-        with_input_rate(continuous(), rate=Box())

@@ -18,7 +18,7 @@ from ocp import (
     Plant,
     PlantInput,
     ProblemError,
-    with_input_rate,
+    Rate,
 )
 from ocp.mpc.input_limits import InputLimits, Instant
 from solvers import LinearMPC, MultipleShooting, StagewiseNewton
@@ -60,10 +60,11 @@ def test_a_soft_plan_is_followed_and_the_speed_brought_back() -> None:
 
 def test_soft_rows_leave_the_actuator_its_own_bound() -> None:
     limited = cart(state_bounds=Box([-9, -0.6], [9, 0.6]))
-    in_rates = with_input_rate(limited, rate=Box(-0.5, 0.5), weight=0.01)
-    plan = LinearMPC(soft=100.0).build(in_rates).run(x0=[2.0, -3.0, 0.0])
+    slow = replace(limited, rates=(Rate(U, -0.5, 0.5, weight=0.01),), last_input=[0.0])
+    plan = LinearMPC(soft=100.0).build(slow).run(x0=[2.0, -3.0])
     assert plan.status.is_success
-    assert np.abs(plan.x[:, 2]).max() <= 2.0 + 1e-7
+    assert np.abs(plan.u).max() <= 2.0 + 1e-7
+    assert np.abs(np.diff(plan.u[:, 0], prepend=0.0)).max() <= 0.5 + 1e-7
     assert plan.x[:, 1].min() < -0.6
 
 
@@ -71,19 +72,21 @@ def test_soft_rows_leave_the_actuator_its_own_bound() -> None:
 
 
 @pytest.mark.parametrize("backup", ["default", "hold"])
-def test_an_actuator_in_rate_form_stays_within_its_bound(backup) -> None:
+def test_a_slow_actuator_stays_within_its_bounds(backup) -> None:
     """A push that no plan can mend in one step: the increment was repeated, up to six bounds."""
     limited = cart(control_bounds=Box(-1.0, 1.0), state_bounds=Box([-9, -0.5], [9, 0.5]))
-    in_rates = with_input_rate(limited, rate=Box(-0.2, 0.2), weight=0.1)
-    mpc = MPC(ocp=in_rates, solver=LinearMPC(), dt=0.1, backup=backup)
-    z, sources = np.zeros(3), set()
+    slow = replace(limited, rates=(Rate(U, -0.2, 0.2, weight=0.1),), last_input=[0.0])
+    mpc = MPC(ocp=slow, solver=LinearMPC(), dt=0.1, backup=backup)
+    x, before, sources = np.zeros(2), 0.0, set()
     for k in range(30):
-        z[1] += 1.2 * (k == 5)
-        decided = mpc.step(z, 0.1 * k)
-        force = z[2] + decided.input[0]
+        x[1] += 1.2 * (k == 5)
+        decided = mpc.step(x, 0.1 * k)
+        force = decided.input[0]
         sources.add(decided.source)
-        z = np.array([z[0] + 0.1 * z[1], z[1] + 0.1 * force, force])
-        assert abs(z[2]) <= 1.0 + 1e-9
+        x = np.array([x[0] + 0.1 * x[1], x[1] + 0.1 * force])
+        assert abs(force) <= 1.0 + 1e-9
+        assert abs(force - before) <= 0.2 + 1e-9
+        before = force
     assert sources - {InputSource.OPTIMAL}
 
 
@@ -97,19 +100,15 @@ def test_a_bound_that_varies_with_time_holds_for_the_backup_too() -> None:
         assert decided.input[0] == pytest.approx(0.5 + 0.4 * np.cos(0.1 * k), abs=1e-9)
 
 
-def test_a_limit_of_the_input_stays_one_in_rate_form() -> None:
-    """After the substitution it contains a state; a mixed constraint is split."""
+def test_a_limit_of_the_input_stays_one_beside_a_rate() -> None:
     supply = Constraint("supply", ca.vertcat(U, X[1]), [-np.inf, -9.0], [0.5, 9.0])
-    in_rates = with_input_rate(cart(constraints=(supply,)), rate=Box(-0.3, 0.3))
-    kinds = {row.name: row.kind for row in in_rates.rows.path.rows}
-    assert kinds == {"supply": "hard", "supply, input": "input", "control_bounds": "input"}
+    slow = cart(constraints=(supply,), rates=(Rate(U, -0.3, 0.3),), last_input=[0.0])
     for solver in (LinearMPC(soft=1.0), LinearMPC()):
-        mpc, z = MPC(ocp=in_rates, solver=solver, dt=0.1), np.array([-2.0, 0.0, 0.0])
+        mpc, x = MPC(ocp=slow, solver=solver, dt=0.1), np.array([-2.0, 0.0])
         for k in range(8):
-            decided = mpc.step(z, 0.1 * k)
-            z[2] += decided.input[0]
-            assert z[2] <= 0.5 + 1e-9
-            z = np.array([z[0] + 0.1 * z[1], z[1] + 0.1 * z[2], z[2]])
+            force = mpc.step(x, 0.1 * k).input[0]
+            assert force <= 0.5 + 1e-9
+            x = np.array([x[0] + 0.1 * x[1], x[1] + 0.1 * force])
 
 
 def test_from_the_middle_of_a_ring_an_input_is_moved_onto_it() -> None:
@@ -118,6 +117,7 @@ def test_from_the_middle_of_a_ring_an_input_is_moved_onto_it() -> None:
     limits = InputLimits(
         replace(plain, constraints=(Constraint("ring", ca.sumsqr(plain.model.u), 0.5, 1.0),)),
         PlantInput(),
+        0.1,
     )
     at = Instant(np.zeros(2), 0.0, np.empty(0))
     found = limits.nearest(np.zeros(2), at)
@@ -149,7 +149,7 @@ def disc() -> OCP:
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_nearest_point_of_a_disc(wanted: list[float]) -> None:
-    limits = InputLimits(disc(), PlantInput())
+    limits = InputLimits(disc(), PlantInput(), 0.1)
     found = limits.nearest(np.array(wanted), Instant(np.zeros(2), 0.0, np.empty(0)))
     assert np.linalg.norm(found) <= 1.0 + 1e-8
     if np.linalg.norm(wanted) > 1.0 and max(map(abs, wanted)) <= 1.0:
@@ -165,16 +165,15 @@ def test_the_nearest_point_of_a_disc(wanted: list[float]) -> None:
     high=st.floats(0, 2),
 )
 def test_rows_of_one_control_are_an_interval(u: float, before: float, low: float, high: float):
-    """Where the actuator is outside already, the rate's own bound wins."""
-    limited = cart(control_bounds=Box(low, high))
-    in_rates = with_input_rate(limited, rate=Box(-0.5, 0.5))
-    at = Instant(np.array([0.0, 0.0, before]), 0.0, np.empty(0))
-    found = float(InputLimits(in_rates, PlantInput()).nearest(np.array([u]), at)[0])
-    assert -0.5 <= found <= 0.5
+    """Where the actuator is outside already, its own bounds win."""
+    slow = cart(control_bounds=Box(low, high), rates=(Rate(U, -0.5, 0.5),), last_input=[low])
+    at = Instant(np.array([0.0, 0.0]), 0.0, np.array([before]))
+    found = float(InputLimits(slow, PlantInput(), 0.1).nearest(np.array([u]), at)[0])
+    assert low <= found <= high
     if low - 0.5 <= before <= high + 0.5:
-        assert low - 1e-12 <= before + found <= high + 1e-12
+        assert abs(found - before) <= 0.5 + 1e-9
     else:
-        assert found == pytest.approx(-0.5 if before > 0 else 0.5)
+        assert found == pytest.approx(high if before > 0 else low)
 
 
 def test_only_a_path_constraint_limits_an_input() -> None:

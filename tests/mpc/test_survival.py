@@ -21,13 +21,13 @@ from ocp import (
     Parameter,
     Plant,
     Program,
+    Rate,
     Rollout,
     Solution,
     Solver,
     Status,
     closed_loop,
     replay_all,
-    with_input_rate,
 )
 from solvers import Collocation, LinearMPC, MultipleShooting, StagewiseNewton
 from tests.mpc.problems import LIMIT, cart, scripted
@@ -116,17 +116,17 @@ def test_a_problem_may_be_used_far_from_where_it_is_declared() -> None:
 
 @pytest.mark.parametrize("solver", [LinearMPC(), MultipleShooting()], ids=repr)
 def test_without_measurements_an_actuator_is_known_by_what_was_sent(solver: Solver) -> None:
-    """A law that adds 0.3 to it at every step drove it to seven times its bound."""
+    """A law that asks for nine times its bound leads there at the rate that is allowed."""
     bounded = replace(LINEAR, control_bounds=Box(-1.0, 1.0))
-    in_rates = with_input_rate(bounded, rate=Box(-0.5, 0.5))
+    slow = replace(bounded, rates=(Rate(_u, -0.5, 0.5),), last_input=[0.0])
     for whole in (0, 1):
-        mpc, force = controller(solver, ocp=in_rates, backup=lambda x, t: [0.3]), 0.0
+        mpc, force = controller(solver, ocp=slow, backup=lambda x, t: [9.0]), 0.0
         for k in range(30):
-            told = [0.1, 0.0, force] if k < whole else [np.nan] * 3
-            decided = mpc.step(told, k * DT)
+            decided = mpc.step([0.1, 0.0] if k < whole else [np.nan] * 2, k * DT)
             assert decided.message or k < whole
-            force += decided.input[0]
-            assert abs(force) <= 1.0 + 1e-9
+            assert abs(decided.input[0] - force) <= 0.5 + 1e-9
+            force = decided.input[0]
+            assert abs(force) <= 1.0
 
 
 # -- solvers --------------------------------------------------------------------------------------

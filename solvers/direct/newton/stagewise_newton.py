@@ -15,6 +15,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     refuse_free_ends,
+    refuse_state_bounds,
 )
 from solvers.direct.first_trajectory import OTHER_STATES, FirstStates
 from solvers.direct.newton.globalised_newton import GlobalisedNewton, NewtonOutcome
@@ -102,8 +103,7 @@ def _refuse(ocp: OCP) -> None:
         raise UnsupportedProblem(
             f"{ocp.name}: stagewise Newton takes no {c.at} constraint ('{c.name}')"
         )
-    if ocp.state_bounds.is_active:
-        raise UnsupportedProblem(f"{ocp.name}: stagewise Newton takes no state bounds")
+    refuse_state_bounds(ocp, "stagewise Newton")
     refuse_free_ends(ocp, "stagewise Newton")
 
 

@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, UnsupportedProblem
+from ocp.internal import refuse_state_bounds
 
 
 def refuse_what_reverse_cannot(ocp: OCP) -> None:
@@ -16,8 +17,9 @@ def refuse_what_reverse_cannot(ocp: OCP) -> None:
         raise UnsupportedProblem(
             f"{ocp.name}: reverse integration takes no path constraint ('{c.name}')"
         )
-    if ocp.state_bounds.is_active:
-        raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no state bounds")
+    refuse_state_bounds(ocp, "reverse integration")
+    for name in ocp.control_rates.names:
+        raise UnsupportedProblem(f"{ocp.name}: reverse integration takes no Rate ('{name}')")
     if ocp.free_start:
         raise UnsupportedProblem(
             f"{ocp.name}: reverse integration takes a start that is given or on a manifold, not "
