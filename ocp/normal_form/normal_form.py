@@ -24,7 +24,8 @@ class NormalForm(Portable):
         problem: the one that methods get.
         unknowns: where unknown constants stand among its states, by name.
         integrals: where integrals stand among its states, by name of the constraint.
-        start: where the state at the start stands among its states; nowhere where no term has it.
+        start: where what terms contain of the state at the start stands among its states.
+        from_start: which states of the original these are copies of.
         slacks: what the controls behind the own ones stand for, in terms of these.
     """
 
@@ -33,11 +34,12 @@ class NormalForm(Portable):
     unknowns: dict[str, slice]
     integrals: dict[str, slice]
     start: slice
+    from_start: tuple[int, ...]
     slacks: ca.SX
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
-        return x[: self.start.stop - self.start.start]
+        return x[list(self.from_start)]
 
     @cached_property
     def slack(self) -> ca.Function:
@@ -55,6 +57,7 @@ def normal_form(ocp: OCP) -> NormalForm | None:
     draft = Draft.of(ocp)
     slacks = soften(draft)
     integrals = add_integrals(draft)
-    start = add_start(draft)
+    from_start = ocp.used_of_start
+    start = add_start(draft, from_start)
     unknowns = add_unknowns(draft)
-    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, slacks)
+    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, from_start, slacks)
