@@ -17,7 +17,7 @@ _VIOLATED = 1e-6
 _ADVICE = "more intervals or a better integrator"
 
 
-def judged_phases(solution: PhasesSolution, accuracy: float, slack: float) -> PhasesSolution:
+def judged_phases(solution: PhasesSolution, accuracy: float, slack: float = 0.0) -> PhasesSolution:
     """Return a solution whose status agrees with the referee, and its message speaks of phases.
 
     Each phase is judged as a problem by itself, see ``judged``; then the links, whose start is to
