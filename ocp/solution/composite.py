@@ -1,7 +1,10 @@
 """What a problem made of several problems, its program and its solution promise."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import Any, Generic, Self, TypeVar
+
+from numpy.typing import ArrayLike
 
 from ocp.problem.portable import Portable
 
@@ -29,8 +32,15 @@ class CompositeProgram(ABC, Generic[S]):
     """Several problems prepared by a solver: all symbolic work is done."""
 
     @abstractmethod
-    def run(self, *, guess: Any = None) -> S:
-        """Solve; a subclass says what else a run takes."""
+    def run(
+        self,
+        *,
+        x0: ArrayLike | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: Any = None,
+    ) -> S:
+        """Solve for these data, see ``Program.run``; a subclass says what they mean."""
 
 
 class CompositeProblem(Portable, ABC, Generic[S]):

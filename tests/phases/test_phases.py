@@ -77,8 +77,8 @@ def test_an_impact(solver):
 
 def test_costates_are_sensitivities_of_the_start():
     """Also across the impact: dJ*/dx0 against the closed form's differences."""
-    found = Collocation(10).build(hop()).run().or_raise()
     program, step = Collocation(10).build(hop()), 1e-4
+    found = program.run()
     for i, shift in enumerate(step * np.eye(2)):
         there, back = (program.run(x0=np.array([1.0, 0.0]) + s).cost for s in (shift, -shift))
         slope = (there - back) / (2 * step)
@@ -144,8 +144,7 @@ def test_phases_of_different_models():
         running_cost=rate**2 / 2,
         terminal_cost=10 * position**2,
     )
-    found = solve(Phases("two", (phase("fly", horizon=1.0), crawl), total=2.0), Collocation(10))
-    found.or_raise()
+    found = solve(Phases("two", (phase("fly", horizon=1.0), crawl)), Collocation(10)).or_raise()
     assert [s.x.shape[1] for s in found.phases] == [2, 1]
     assert found.phases[1].x[0, 0] == pytest.approx(found.phases[0].x[-1, 0], abs=1e-9)
     # Nothing wants a speed at the end of the first phase.
@@ -247,7 +246,7 @@ def test_a_cycle_of_two_phases_is_a_period():
     halves = tuple(phase(name, horizon=1.0, **given) for name in ("out", "home"))
     cycle = Phases("cycle", halves, (Link(), Link()))
     for solver in (Collocation(10), IndirectShooting(10)):
-        whole, found = (solve(p, solver).or_raise() for p in (uncut, cycle))
+        whole, found = solve(uncut, solver).or_raise(), solve(cycle, solver).or_raise()
         assert found.cost == pytest.approx(whole.cost, rel=1e-6)
         assert found.phases[1].x[-1] == pytest.approx(found.phases[0].x[0], abs=1e-8)
 
