@@ -3,6 +3,7 @@
 import numpy as np
 
 from ocp.method.judged import judged
+from ocp.phases.alike import undecided_durations
 from ocp.phases.phases_evaluation import link_values
 from ocp.phases.phases_solution import PhasesSolution
 from ocp.phases.violated_phases import most_violated_phase
@@ -28,6 +29,12 @@ def judged_phases(solution: PhasesSolution, accuracy: float, slack: float = 0.0)
         accuracy: relative; inf: nothing is compared.
         slack: by how much an end may be missed in any case, in its own unit.
     """
+    found = _judged(solution, accuracy, slack)
+    said = (found.message, undecided_durations(solution.problem))
+    return found.with_(message="; ".join(part for part in said if part))
+
+
+def _judged(solution: PhasesSolution, accuracy: float, slack: float) -> PhasesSolution:
     if not solution.status.is_success:
         return _failed(solution)
     if not np.isfinite(accuracy):

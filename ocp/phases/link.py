@@ -53,6 +53,11 @@ class Link(Portable):
                 check_instance(state, str, "link: an entry of states")
             object.__setattr__(self, "states", tuple(self.states))
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether all states go on as they are."""
+        return self.reset is None and self.states is None and self.equations is None
+
 
 class LinkRows(NamedTuple):
     """A link between two phases: rows that are zero.

@@ -3,11 +3,14 @@
 import copy
 import pickle
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 
+import ocp
 from ocp import (
     Box,
     Constraint,
@@ -16,10 +19,11 @@ from ocp import (
     Phases,
     PhasesSolution,
     ProblemError,
+    Status,
     evaluate,
     solve,
 )
-from solvers import Collocation, IndirectShooting, MultipleShooting
+from solvers import Collocation, IndirectShooting, MultipleShooting, certify, polish
 from tests.phases.problems import BALL, FALL, RISE, U, V, hop, phase
 
 FOUND = solve(hop(), Collocation(6)).or_raise()
@@ -99,3 +103,32 @@ def test_the_shortest_way_is_full_push_and_full_brake():
     found = solve(Phases("shortest", (push, brake)), MultipleShooting(2)).or_raise()
     assert found.durations == pytest.approx([1.0, 1.0], abs=1e-7)
     assert found.cost == pytest.approx(2.0, abs=1e-7)
+
+
+def test_the_page_runs_as_it_stands():
+    page = (Path(__file__).parents[2] / "docs" / "phases.md").read_text(encoding="utf-8")
+    code = page.split("```python\n")[1].split("```")[0]
+    names: dict[str, Any] = {"ca": ca} | {name: getattr(ocp, name) for name in ocp.__all__}
+    exec(code, names | {"Collocation": Collocation}, names)
+    assert names["s"].durations == pytest.approx([0.677, 0.823], abs=1e-3)
+
+
+@pytest.mark.slow  # two methods, other starts, conditions on a grid
+def test_an_impact_is_certified():
+    certificate = certify(FOUND)
+    assert certificate.holds
+    assert {check.name for check in certificate.checks} >= {"phases, cost", "phases, feasibility"}
+
+
+def test_phases_that_are_alike_have_no_unique_solution():
+    """Nothing happens between them: time shifts from one to the other at no cost."""
+    rest = Constraint("rest", BALL.x, [1, 0], [1, 0], at="terminal")
+    free = {"model": replace(BALL, f=ca.vertcat(V, U)), "x0": [0.0, 0.0]}
+    pair = (phase("one", **free), phase("two", constraints=(rest,), **free))
+    found = solve(Phases("alike", pair, total=1.0), Collocation(6)).or_raise()
+    assert found.cost == pytest.approx(6.0, abs=1e-7)
+    assert "'one' and 'two' are alike" in found.message
+    polished = polish(found)
+    assert polished.status is not Status.SOLVED
+    assert "not unique" in polished.message
+    assert "alike" not in FOUND.message
