@@ -20,6 +20,10 @@ from ocp.mpc.mpc import MPC
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.record_file import records
 from ocp.mpc.record_format import Record
+from ocp.phases.link import Link
+from ocp.phases.phases import Phases
+from ocp.phases.phases_evaluation import PhasesEvaluation
+from ocp.phases.phases_solution import PhasesSolution
 from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
@@ -54,11 +58,15 @@ __all__ = [
     "InputSource",
     "Integrator",
     "InterpretedWarning",
+    "Link",
     "Midpoint",
     "MinimumPrinciple",
     "Model",
     "OCPError",
     "Parameter",
+    "Phases",
+    "PhasesEvaluation",
+    "PhasesSolution",
     "Plant",
     "PlantInput",
     "Polyhedron",

@@ -36,6 +36,8 @@ from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.phases.judged_phases import judged_phases
+from ocp.phases.link import LinkRows
 from ocp.problem.algebraic_controls import AlgebraicControls
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -74,6 +76,7 @@ __all__ = [
     "Jump",
     "LQData",
     "LinearQuadratic",
+    "LinkRows",
     "Matrices",
     "MethodProgram",
     "MethodSolver",
@@ -112,6 +115,7 @@ __all__ = [
     "interpolate",
     "interruptible",
     "judged",
+    "judged_phases",
     "jumps_along",
     "least_violating",
     "most_violated",

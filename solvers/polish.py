@@ -1,13 +1,15 @@
 """From a direct solution to an extremal: indirect multiple shooting, second-order test."""
 
 from time import perf_counter
+from typing import overload
 
-from ocp import Solution, Status, UnsupportedProblem, evaluate
+from ocp import PhasesSolution, Solution, Status, UnsupportedProblem, evaluate
 from ocp.internal import (
     ACCURACY,
     check_instance,
     check_positive,
     judged,
+    judged_phases,
     rewriting_of,
 )
 from solvers.constrained.inactive_bounds import without_inactive
@@ -24,9 +26,24 @@ _MOST_INTERVALS = 600
 _VIOLATED = 1e-6
 
 
+@overload
 def polish(
     solution: Solution, *, solver: IndirectShooting | None = None, accuracy: float = 1e-8
-) -> Solution:
+) -> Solution: ...
+
+
+@overload
+def polish(
+    solution: PhasesSolution, *, solver: IndirectShooting | None = None, accuracy: float = 1e-8
+) -> PhasesSolution: ...
+
+
+def polish(
+    solution: Solution | PhasesSolution,
+    *,
+    solver: IndirectShooting | None = None,
+    accuracy: float = 1e-8,
+) -> Solution | PhasesSolution:
     """Polish a solution to an extremal, and say whether it is a minimum.
 
     States and costates of the solution start indirect multiple shooting; where Newton fails
@@ -39,7 +56,8 @@ def polish(
     out; the result is checked against them by the referee, and its message names them.
 
     Args:
-        solution: of any method that returns costates, near an extremal.
+        solution: of any method that returns costates, near an extremal; of ``Phases`` all of them
+            are polished together.
         solver: segments, first number of steps, tolerance; default 15 segments, 300 steps.
         accuracy: double the steps until half of them would change the cost by less, relative
             to 1 + cost, and the state at the end of a segment by less than 100 times that,
@@ -53,9 +71,12 @@ def polish(
             bounds that act, a Hamiltonian linear in the control, a cost with kinks).
     """
     check_positive(accuracy, "polish: accuracy")
-    check_instance(solution, Solution, "polish: solution")
+    check_instance(solution, (Solution, PhasesSolution), "polish: solution")
     solver = solver or IndirectShooting(segments=SEGMENTS, steps=STEPS)
     check_instance(solver, IndirectShooting, "polish: solver")
+    if isinstance(solution, PhasesSolution):
+        whole = polish(solution.whole, solver=solver, accuracy=accuracy)
+        return judged_phases(PhasesSolution(solution.side, whole), ACCURACY)
     ocp = solution.problem
     if ocp.smoothness == 0:
         raise UnsupportedProblem(

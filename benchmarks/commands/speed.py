@@ -1,4 +1,4 @@
-"""``speed`` and ``arm-speed``: what a step of linear control and of MPC on the arm costs."""
+"""``speed``, ``arm-speed``, ``phases-speed``: what a step of control, a chain of phases cost."""
 
 from argparse import ArgumentParser, Namespace
 
@@ -10,6 +10,7 @@ from benchmarks.speed.arm import INTERVALS, LINKS
 from benchmarks.speed.arm_tables import print_arm_speed
 from benchmarks.speed.linear import HORIZONS
 from benchmarks.speed.linear_tables import print_speed
+from benchmarks.speed.phases_tables import print_phases_speed
 
 
 def _linear_options(parser: ArgumentParser) -> None:
@@ -40,5 +41,17 @@ def _arm(options: Namespace, console: Console) -> int:
     return 0
 
 
+def _phases_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--count", type=positive, default=5, metavar="K", help="runs measured")
+
+
+def _phases(options: Namespace, console: Console) -> int:
+    print_phases_speed(console, options.count)
+    return 0
+
+
 SPEED = Command("speed", "linear control: a step over N", _linear_options, _linear)
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
+PHASES_SPEED = Command(
+    "phases-speed", "phases beside a chain written by hand", _phases_options, _phases
+)

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import Self, overload
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ocp.method.rewriting import Rewriting, RewrittenProgram
 from ocp.normal_form.normal_form import NormalForm, normal_form
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
+from ocp.solution.composite import CompositeProblem, CompositeProgram, S
 from ocp.solution.solver import Program, Solver
 
 #: By how much own cost and the referee's may differ, relative, where a solver has no option.
@@ -38,14 +39,23 @@ class MethodSolver(Solver):
         check_flag(self.judged, f"{type(self).__name__}: judged")
         check_flag(self.takes_knots, f"{type(self).__name__}: takes_knots")
 
+    @overload
+    def build(self, ocp: OCP) -> Program: ...
+
+    @overload
+    def build(self, ocp: CompositeProblem[S]) -> CompositeProgram[S]: ...
+
     @interruptible
-    def build(self, ocp: OCP) -> Program:
+    def build(self, ocp: OCP | CompositeProblem[S]) -> Program | CompositeProgram[S]:
         """Do all symbolic work for a problem, after it is brought into its normal form.
 
         Raises:
             UnsupportedProblem: naming the term that this method cannot treat.
         """
-        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+        check_instance(ocp, (OCP, CompositeProblem), f"{type(self).__name__}: the problem")
+        if isinstance(ocp, CompositeProblem):
+            return ocp.built_by(self)
+        self.refuse_written(ocp)
         form = normal_form(ocp)
         if form is None:
             return self.build_normal(ocp)
@@ -54,6 +64,13 @@ class MethodSolver(Solver):
     def build_form(self, form: NormalForm) -> Program:
         """Build it for a problem in its normal form; here with algebraic variables solved for."""
         return self.build_normal(form.problem)
+
+    def refuse_written(self, ocp: OCP) -> None:
+        """Refuse what only a problem as it was written shows; here nothing.
+
+        Raises:
+            UnsupportedProblem: naming the term.
+        """
 
     def build_normal(self, ocp: OCP) -> Program:
         """Build it for a problem in normal form; here in the units it is written in."""

@@ -25,7 +25,8 @@ class NormalForm(Portable):
         implicit: the one that methods get, with the algebraic variables of the original.
         unknowns: where unknown constants stand among its states, by name.
         integrals: where integrals stand among its states, by name of the constraint.
-        start: where the state at the start stands among its states; nowhere where no term has it.
+        start: where what terms contain of the state at the start stands among its states.
+        from_start: which states of the original these are copies of.
         slacks: what the last controls stand for, in terms of the original.
         controls: where the own controls stand among its states and controls, (nu,).
         rates: which of its controls are the rates of those that are states, in their order.
@@ -37,6 +38,7 @@ class NormalForm(Portable):
     unknowns: dict[str, slice]
     integrals: dict[str, slice]
     start: slice
+    from_start: tuple[int, ...]
     slacks: ca.SX
     controls: np.ndarray
     rates: np.ndarray
@@ -53,7 +55,7 @@ class NormalForm(Portable):
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
-        return x[: self.start.stop - self.start.start]
+        return x[list(self.from_start)]
 
     @cached_property
     def slack(self) -> ca.Function:
@@ -73,14 +75,16 @@ def normal_form(ocp: OCP) -> NormalForm | None:
     last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
-    start = add_start(draft)
+    from_start = ocp.used_of_start
+    start = add_start(draft, from_start)
     unknowns = add_unknowns(draft)
     return NormalForm(
         original=ocp,
-        problem=draft.problem(),
+        implicit=draft.problem(),
         unknowns=unknowns,
         integrals=integrals,
         start=start,
+        from_start=from_start,
         slacks=slacks,
         controls=draft.own_controls(),
         rates=len(draft.kept) + np.arange(len(draft.moved)),

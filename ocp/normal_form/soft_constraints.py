@@ -21,8 +21,9 @@ from ocp.problem.soft import excess, slackened
 
 def soften(draft: Draft) -> ca.SX:
     """Replace every soft constraint; return what the slacks among the controls stand for."""
-    sizes, slacks = sizes_of(draft.ocp).rows, [ca.SX(0, 1)]
+    slacks = [ca.SX(0, 1)]
     for c in [c for c in draft.constraints if c.soft is not None]:
+        sizes = sizes_of(draft.ocp).rows
         draft.constraints.remove(c)
         priced = np.asarray(c.soft.linear) > 0.0 if c.soft else np.zeros(c.size, dtype=bool)
         for with_slack in (True, False):

@@ -6,6 +6,8 @@ Their costate at t0 is the sensitivity dJ*/dk: 0 inside the bounds, on a bound i
 at the start is such a constant too, s with s = x(t0).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
@@ -25,20 +27,21 @@ def add_unknowns(draft: Draft) -> dict[str, slice]:
     }
 
 
-def add_start(draft: Draft) -> slice:
-    """Make the state at the start, where terms contain it, a state; return where it stands."""
-    ocp, m = draft.ocp, draft.ocp.model
-    if not ocp.refers_to_start:
+def add_start(draft: Draft, used: Sequence[int]) -> slice:
+    """Make what terms contain of the state at the start states; return where they stand.
+
+    Args:
+        draft: the problem so far.
+        used: which states these are.
+    """
+    ocp, m, index = draft.ocp, draft.ocp.model, list(used)
+    if not index:
         return slice(m.nx, m.nx)
-    same = Constraint(
-        draft.unused("start of the states"),
-        m.start - m.x,
-        np.zeros(m.nx),
-        np.zeros(m.nx),
-        at="initial",
-    )
-    draft.constraints.append(same)
-    return draft.add_states(AddedStates.constant(ocp, m.start, ocp.start(), size=sizes_of(ocp).x))
+    symbol, zero = m.start[index], np.zeros(len(index))
+    name = draft.unused("start of the states")
+    draft.constraints.append(Constraint(name, symbol - m.x[index], zero, zero, at="initial"))
+    size = sizes_of(ocp).x[index]
+    return draft.add_states(AddedStates.constant(ocp, symbol, ocp.start()[index], size=size))
 
 
 def _size(entry: Unknown) -> np.ndarray:

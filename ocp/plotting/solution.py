@@ -1,6 +1,6 @@
 """Figure of a solution: states, controls, costates and constraints over time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import reduce
@@ -88,7 +88,7 @@ class PlottableSolution(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class _Panel:
+class Panel:
     """One pair of axes: a line per column of ``values``, with bounds.
 
     A held quantity has one row less than there are instants.
@@ -103,6 +103,7 @@ class _Panel:
 
     @property
     def is_held(self) -> bool:
+        """Whether each row holds until the next instant."""
         return len(self.values) < len(self.t)
 
 
@@ -147,31 +148,35 @@ def _instants(solution: PlottableSolution) -> np.ndarray:
     return np.union1d(solution.t, np.linspace(solution.t[0], solution.t[-1], _POINTS))
 
 
-def _states(solution: PlottableSolution) -> _Panel:
+def states(solution: PlottableSolution) -> Panel:
+    """Return the states."""
     ocp, t = solution.problem, _instants(solution)
     m = ocp.model
-    return _Panel("states", m.x_names, m.x_units, t, solution.state(t), ocp.state_bounds)
+    return Panel("states", m.x_names, m.x_units, t, solution.state(t), ocp.state_bounds)
 
 
-def _controls(solution: PlottableSolution) -> _Panel:
+def controls(solution: PlottableSolution) -> Panel:
+    """Return the controls, with a row less where they are held."""
     ocp, t = solution.problem, _instants(solution)
     m = ocp.model
     u = solution.u if solution.control_kind == "held" else solution.control(t)
-    return _Panel("controls", m.u_names, m.u_units, t, u, ocp.control_bounds)
+    return Panel("controls", m.u_names, m.u_units, t, u, ocp.control_bounds)
 
 
-def _algebraic(solution: PlottableSolution) -> _Panel:
+def algebraic(solution: PlottableSolution) -> Panel:
+    """Return the algebraic variables."""
     m, t = solution.problem.model, _instants(solution)
-    return _Panel("algebraic variables", m.z_names, m.z_units, t, solution.algebraic(t))
+    return Panel("algebraic variables", m.z_names, m.z_units, t, solution.algebraic(t))
 
 
-def _costates(solution: PlottableSolution) -> _Panel:
+def costates(solution: PlottableSolution) -> Panel:
+    """Return the costates."""
     names = tuple(f"∂J/∂({name})" for name in solution.problem.model.x_names)
     t = _instants(solution)
-    return _Panel("costates", names, (), t, solution.costate_at(t))
+    return Panel("costates", names, (), t, solution.costate_at(t))
 
 
-def _path(solution: PlottableSolution) -> _Panel:
+def _path(solution: PlottableSolution) -> Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), solution.control(t), t[:, None], _parameters(solution, t)]
     panel = _constraints("path constraints", ocp.rows.path, ocp.functions.path, given, t)
@@ -179,7 +184,7 @@ def _path(solution: PlottableSolution) -> _Panel:
     return replace(panel, box=reduce(and_, limits)) if limits else panel
 
 
-def _invariants(solution: PlottableSolution) -> _Panel:
+def _invariants(solution: PlottableSolution) -> Panel:
     ocp, t = solution.problem, _instants(solution)
     given = [solution.state(t), t[:, None], _parameters(solution, t)]
     return _constraints("invariants", ocp.rows.invariants, ocp.functions.invariants, given, t)
@@ -195,9 +200,9 @@ def _constraints(
     function: ca.Function,
     given: list[np.ndarray],
     t: np.ndarray,
-) -> _Panel:
+) -> Panel:
     values = np.array(function.map(len(t))(*[a.T for a in given])).T.reshape(len(t), len(rows))
-    return _Panel(title, _row_names(rows), (), t, values, rows.box)
+    return Panel(title, _row_names(rows), (), t, values, rows.box)
 
 
 def _row_names(rows: ConstraintRows) -> tuple[str, ...]:
@@ -209,11 +214,11 @@ def _row_names(rows: ConstraintRows) -> tuple[str, ...]:
     return tuple(found)
 
 
-_PANELS: tuple[Callable[[PlottableSolution], _Panel], ...] = (
-    _states,
-    _controls,
-    _algebraic,
-    _costates,
+_PANELS: tuple[Callable[[PlottableSolution], Panel], ...] = (
+    states,
+    controls,
+    algebraic,
+    costates,
     _path,
     _invariants,
 )
@@ -222,23 +227,32 @@ _PANELS: tuple[Callable[[PlottableSolution], _Panel], ...] = (
 # -- how it is drawn ------------------------------------------------------------------
 
 
-def _draw(ax: Axes, panel: _Panel) -> None:
+def _draw(ax: Axes, panel: Panel) -> None:
     count = len(panel.names)
     few = count <= _FEW
     colours = colormaps["tab10"](np.arange(count))
     if not few:
         colours = colormaps["turbo"](np.linspace(0.03, 0.97, count))
-    for i, (name, colour) in enumerate(zip(_labels(panel), colours, strict=True)):
+    draw_lines(ax, panel, colours, _labels(panel))
+    if panel.box is not None:
+        _draw_bounds(ax, panel.box, panel.values, colours)
+    decorate(ax, panel.title + _shared_unit(panel), count)
+
+
+def draw_lines(ax: Axes, panel: Panel, colours: ArrayLike, labels: Sequence[str]) -> None:
+    """Draw a line for each column of a panel."""
+    for i, (label, colour) in enumerate(zip(labels, np.asarray(colours), strict=True)):
         rows = panel.values[:, i]
         if panel.is_held:
             rows = np.append(rows, rows[-1])
-            ax.step(panel.t, rows, where="post", color=colour, label=name, linewidth=1.4)
+            ax.step(panel.t, rows, where="post", color=colour, label=label, linewidth=1.4)
         else:
-            ax.plot(panel.t, rows, color=colour, label=name, linewidth=1.4)
-    if panel.box is not None:
-        _draw_bounds(ax, panel.box, panel.values, colours)
-    shared = f" [{panel.units[0]}]" if len(set(panel.units)) == 1 else ""
-    ax.set_ylabel(panel.title + shared)
+            ax.plot(panel.t, rows, color=colour, label=label, linewidth=1.4)
+
+
+def decorate(ax: Axes, title: str, count: int) -> None:
+    """Give a panel with a number of lines its title, grid and legend."""
+    ax.set_ylabel(title)
     ax.grid(alpha=0.25, linewidth=0.6)
     ax.margins(x=0.0, y=0.08)
     ax.legend(
@@ -246,10 +260,14 @@ def _draw(ax: Axes, panel: _Panel) -> None:
         bbox_to_anchor=(1.005, 0.5),
         ncols=-(-count // _LEGEND_ROWS),
         frameon=False,
-        fontsize="small" if few else 7.0,
+        fontsize="small" if count <= _FEW else 7.0,
         labelspacing=0.3,
         handlelength=1.4,
     )
+
+
+def _shared_unit(panel: Panel) -> str:
+    return f" [{panel.units[0]}]" if len(set(panel.units)) == 1 else ""
 
 
 def _draw_bounds(ax: Axes, box: Box, values: np.ndarray, colours: np.ndarray) -> None:
@@ -264,7 +282,7 @@ def _draw_bounds(ax: Axes, box: Box, values: np.ndarray, colours: np.ndarray) ->
         ax.axhline(bound, color=colour, linestyle=(0, (5, 4)), linewidth=0.8)
 
 
-def _labels(panel: _Panel) -> tuple[str, ...]:
+def _labels(panel: Panel) -> tuple[str, ...]:
     """The names, with their units where these differ."""
     if len(set(panel.units)) < 2:
         return panel.names

@@ -100,7 +100,7 @@ def _lines(ocp: _Problem) -> Iterable[str]:
         yield f"    0 = {readable(row)}   (algebraic, of {name} and others)"
     if ocp.has_free_time:
         box = ocp.time_box
-        yield f"    {_between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"
+        yield f"    {between(np.asarray(box.lower)[0], 'T', np.asarray(box.upper)[0])} s, free"
     yield f"    x(0) = {_vector(ocp.x0)}" + _freedom(ocp.start_is_free, m.x_names)
     yield from _bounds(ocp.start_bounds, tuple(f"{n}(0)" for n in m.x_names), m.x_units)
     yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
@@ -111,7 +111,7 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     for c in ocp.invariants:
         yield from _constraint(c, "kept by the dynamics")
     for entry in ocp.unknowns:
-        yield f"    {entry.name} ({', '.join(element_names(entry.symbol))}): {_unknown(entry)}"
+        yield f"    {unknown_in_words(entry)}"
     for entry in ocp.parameters:
         symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
         yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
@@ -127,18 +127,18 @@ def _rates(ocp: _Problem) -> Iterable[str]:
         last = ocp.last_input
         said = [f"at {w:g} ({change})^2"] if w > 0.0 else []
         said += ["last input free" if last is None else f"last input {np.asarray(last)[i]:g}"]
-        yield f"    {_between(low, change, high)}   ({', '.join(said)})"
+        yield f"    {between(low, change, high)}   ({', '.join(said)})"
 
 
-def _unknown(entry: Unknown) -> str:
+def unknown_in_words(entry: Unknown) -> str:
     """Say what is known of an unknown constant: its bounds and the guess."""
-    each = zip(
-        element_names(entry.symbol), np.asarray(entry.lower), np.asarray(entry.upper), strict=True
-    )
+    names = element_names(entry.symbol)
+    each = zip(names, np.asarray(entry.lower), np.asarray(entry.upper), strict=True)
     bounds = [
-        _between(low, name, high) for name, low, high in each if np.isfinite([low, high]).any()
+        between(low, name, high) for name, low, high in each if np.isfinite([low, high]).any()
     ]
-    return ", ".join(["unknown constant", *bounds, f"guess {_vector(entry.value)}"])
+    said = ", ".join(["unknown constant", *bounds, f"guess {_vector(entry.value)}"])
+    return f"{entry.name} ({', '.join(names)}): {said}"
 
 
 def _freedom(free: np.ndarray, names: tuple[str, ...]) -> str:
@@ -157,14 +157,14 @@ def _bounds(box: Box, names: tuple[str, ...], units: tuple[str, ...]) -> Iterabl
     lower, upper = np.asarray(box.lower), np.asarray(box.upper)
     for i, name in enumerate(names):
         if np.isfinite(lower[i]) or np.isfinite(upper[i]):
-            yield f"    {_between(lower[i], name, upper[i])}" + (f" {units[i]}" if units else "")
+            yield f"    {between(lower[i], name, upper[i])}" + (f" {units[i]}" if units else "")
 
 
 def _constraint(c: Constraint, where: str) -> Iterable[str]:
     lower, upper = np.asarray(c.lower), np.asarray(c.upper)
     for i, row in enumerate(ca.vertsplit(c.expression)):
         said = f"{c.name}, {where}" if c.soft is None else f"{c.name}, {where}, {_soft(c.soft, i)}"
-        yield f"    {_between(lower[i], readable(row), upper[i])}   ({said})"
+        yield f"    {between(lower[i], readable(row), upper[i])}   ({said})"
 
 
 def _soft(soft: Soft, row: int) -> str:
@@ -173,7 +173,8 @@ def _soft(soft: Soft, row: int) -> str:
     return "soft at " + " + ".join(parts)
 
 
-def _between(lower: float, middle: str, upper: float) -> str:
+def between(lower: float, middle: str, upper: float) -> str:
+    """Say between which bounds something lies; one that is infinite is left out."""
     if lower == upper:
         return f"{middle} = {lower:g}"
     left = f"{lower:g} <= " if np.isfinite(lower) else ""

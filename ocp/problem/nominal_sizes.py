@@ -88,6 +88,23 @@ class _Point(NamedTuple):
 def nominal_sizes(ocp: OCP) -> Sizes:
     """Return the nominal sizes of a problem; what the user declared as nominal stays."""
     functions, points = _Functions.of(ocp), _points(ocp)
+    m = ocp.model
+    if m.x_nominal is None or m.u_nominal is None:
+        log_sizes = _estimated(ocp, functions, points)
+    else:
+        log_sizes = _with_cost(ocp, functions, points, np.append(m.x_nominal, m.u_nominal))
+    x, u = np.exp(log_sizes[: m.nx]), np.exp(log_sizes[m.nx : -1])
+    if m.x_nominal is not None:
+        x = np.asarray(m.x_nominal, dtype=float)
+    if m.u_nominal is not None:
+        u = np.asarray(m.u_nominal, dtype=float)
+    last = [*points, *_displaced(ocp, points, np.concatenate([x, u, [1.0]]))]
+    rows = {c.name: functions.row_sizes(c, last, np.concatenate([x, u])) for c in ocp.constraints}
+    return Sizes(x, u, float(np.exp(log_sizes[-1])), rows)
+
+
+def _estimated(ocp: OCP, functions: "_Functions", points: list[_Point]) -> np.ndarray:
+    """Return the logarithms of all sizes (nx + nu + 1,), the cost's last."""
     size = ocp.model.nx + ocp.model.nu + 1
     known = [*_given(ocp), *functions.rate_sizes(points[0])]
     # Before anything is known of sizes no point lies a size away.
@@ -98,15 +115,24 @@ def nominal_sizes(ocp: OCP) -> Sizes:
         for point, beside in zip(points, _displaced(ocp, points, np.exp(log_sizes)), strict=True):
             equations += [*functions.equations(beside), *functions.of_curvature(point, beside)]
         log_sizes = solved(equations, size)
-    nx = ocp.model.nx
-    x, u = np.exp(log_sizes[:nx]), np.exp(log_sizes[nx:-1])
-    if ocp.model.x_nominal is not None:
-        x = np.asarray(ocp.model.x_nominal, dtype=float)
-    if ocp.model.u_nominal is not None:
-        u = np.asarray(ocp.model.u_nominal, dtype=float)
-    last = [*points, *_displaced(ocp, points, np.concatenate([x, u, [1.0]]))]
-    rows = {c.name: functions.row_sizes(c, last, np.concatenate([x, u])) for c in ocp.constraints}
-    return Sizes(x, u, float(np.exp(log_sizes[-1])), rows)
+    return log_sizes
+
+
+def _with_cost(
+    ocp: OCP, functions: "_Functions", points: list[_Point], declared: np.ndarray
+) -> np.ndarray:
+    """Return the same where those of all states and controls are declared (nx + nu,)."""
+    log_sizes, cost = np.append(np.log(declared), 0.0), len(declared)
+    beside = _displaced(ocp, points, np.append(declared, 1.0))
+    equations = [e for point in points for e in functions.of_costs(point)]
+    for pair in zip(points, beside, strict=True):
+        equations += functions.of_curvature(*pair)
+    values = [
+        e.value - sum(log_sizes[i] for i in e.plus if i != cost) + log_sizes[list(e.minus)].sum()
+        for e in equations
+    ]
+    log_sizes[cost] = np.mean(values) if values else 0.0
+    return log_sizes
 
 
 @dataclass(frozen=True, eq=False)

@@ -161,17 +161,23 @@ class OCP(Portable):
     def _control_rates(self) -> ControlRates:
         return ControlRates.of(self.name, self.model, self.rates)
 
-    @cached_property
+    @property
     def refers_to_start(self) -> bool:
         """Whether a term contains the state at the start."""
-        start = {e.element_hash() for e in ca.vertsplit(self.model.start)}
+        return bool(self.used_of_start)
+
+    @cached_property
+    def used_of_start(self) -> tuple[int, ...]:
+        """Which components of the state at the start terms contain."""
         written = [
             *(e for e in (self.running_cost, self.terminal_cost) if isinstance(e, ca.SX)),
             *(c.expression for c in (*self.constraints, *self.invariants)),
             self.model.f,
             self.model.algebraic,
         ]
-        return any(s.element_hash() in start for s in ca.symvar(ca.veccat(*written)))
+        found = {s.element_hash() for s in ca.symvar(ca.veccat(*written))}
+        start = ca.vertsplit(self.model.start)
+        return tuple(i for i, symbol in enumerate(start) if symbol.element_hash() in found)
 
     @property
     def has_free_time(self) -> bool:

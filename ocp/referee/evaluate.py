@@ -1,6 +1,7 @@
 """The referee: what a solution's controls really cost, violate and leave unoptimised."""
 
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoin
 from ocp.referee.segments import defects, gaps, growth, worth
 from ocp.referee.stationarity import final_costate, stationarity
 from ocp.referee.violation import invariant_drift, largest_violation
+from ocp.solution.composite import CompositeSolution, V
 from ocp.solution.control_rate import price_of_rates
 from ocp.solution.solution import Solution
 
 # Accepted error of the cost, relative to its size.
-_TOLERANCE = 1e-9
+TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,24 +65,37 @@ class Evaluation:
     truth: ReferenceTrajectory
 
 
+@overload
+def evaluate(solution: Solution, *, tolerance: float = TOLERANCE) -> Evaluation: ...
+
+
+@overload
+def evaluate(solution: CompositeSolution[V], *, tolerance: float = TOLERANCE) -> V: ...
+
+
 @interruptible
-def evaluate(solution: Solution, *, tolerance: float = _TOLERANCE) -> Evaluation:
+def evaluate(
+    solution: Solution | CompositeSolution[V], *, tolerance: float = TOLERANCE
+) -> Evaluation | V:
     """Judge a solution by integrating its controls, whatever its solver says.
 
     The latest verdicts are kept with the problem: the second call costs nothing.
 
     Args:
-        solution: of any solver, with controls of any kind.
+        solution: of any solver, with controls of any kind; or of ``Phases``.
         tolerance: accepted error of the cost, relative to its size, see ``integrate_controls``.
 
     Returns:
-        the verdict; nothing is raised for a bad trajectory, its numbers are bad.
+        the verdict, of phases a ``PhasesEvaluation``; nothing is raised for a bad trajectory, its
+        numbers are bad.
 
     Raises:
         ProblemError: if it is no solution, or the tolerance not positive.
     """
-    check_instance(solution, Solution, "evaluate: solution")
+    check_instance(solution, (Solution, CompositeSolution), "evaluate: solution")
     check_positive(tolerance, "evaluate: tolerance")
+    if isinstance(solution, CompositeSolution):
+        return solution.evaluated(tolerance)
     return _evaluation(solution, tolerance)
 
 
@@ -112,7 +127,7 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
 def _stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None:
     """The residual of the minimum principle, which is that of the normal form."""
     if solution.normal is not None:
-        return _evaluation(solution.normal, _TOLERANCE).stationarity
+        return _evaluation(solution.normal, TOLERANCE).stationarity
     return stationarity(solution, truth)
 
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
+from typing import Any, ClassVar, Protocol, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from ocp.checks.interrupts import interruptible
 from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import Portable
+from ocp.solution.composite import CompositeProblem, S
 from ocp.solution.solution import Solution
 
 
@@ -66,7 +67,13 @@ class Program(ABC):
 
 
 class Solver(Portable, ABC):
-    """A method with its options: a frozen dataclass whose fields are typed."""
+    """A method with its options: a frozen dataclass whose fields are typed.
+
+    Attributes:
+        takes_phases: whether it can solve ``Phases``: starts that are free and coupled with ends.
+    """
+
+    takes_phases: ClassVar[bool] = False
 
     @abstractmethod
     def build(self, ocp: OCP) -> Program:
@@ -143,14 +150,23 @@ def _built(solver: Solver, ocp: OCP) -> Program:
     return solver.prepare(ocp)
 
 
+@overload
+def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution: ...
+
+
+@overload
+def solve(ocp: CompositeProblem[S], solver: Solver, *, guess: Any = None) -> S: ...
+
+
 @interruptible
-def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Solution:
+def solve(ocp: OCP | CompositeProblem[S], solver: Solver, *, guess: Any = None) -> Solution | S:
     """Solve a problem once: ``solver.build(ocp).run(guess=guess)``, with the build timed.
 
     Args:
-        ocp: the problem.
+        ocp: the problem, or ``Phases``.
         solver: the method with its options.
-        guess: where to start; without one the problem's own guess, else the method's default.
+        guess: where to start; without one the problem's own guess, else the method's default. Of
+            phases a sequence with one for each, or a solution of them.
 
     Returns:
         the solution, whatever its status; ``or_raise()`` insists on success.
@@ -159,10 +175,10 @@ def solve(ocp: OCP, solver: Solver, *, guess: InitialGuess | None = None) -> Sol
         UnsupportedProblem: where the method cannot treat the problem, naming the term.
         ProblemError: if an argument is of another kind, or the guess does not fit.
     """
-    check_instance(ocp, OCP, "solve: ocp")
+    check_instance(ocp, (OCP, CompositeProblem), "solve: ocp")
     check_instance(solver, Solver, "solve: solver")
     ocp.first_guess(guess)
     start = perf_counter()
-    program = solver.build(ocp)
+    program = ocp.built_by(solver) if isinstance(ocp, CompositeProblem) else solver.build(ocp)
     build_time = perf_counter() - start
     return program.run(guess=guess).with_(build_time=build_time)

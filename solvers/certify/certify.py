@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ocp import Solution, Status, UnsupportedProblem, evaluate
+from ocp import PhasesSolution, Solution, Status, UnsupportedProblem, evaluate
 from ocp.internal import (
     InNormalForm,
     check_flag,
@@ -45,6 +45,7 @@ from solvers.certify.global_evidence import (
 from solvers.certify.grid_conditions import CHECKS as GRID
 from solvers.certify.grid_conditions import grid_checks
 from solvers.certify.hamiltonian_check import hamiltonian_check
+from solvers.certify.of_phases import with_phases
 from solvers.collocation.collocation import Collocation
 from solvers.direct.multiple_shooting import MultipleShooting
 
@@ -113,7 +114,9 @@ class _Clock:
         return Check.skipped(name, f"left out: the {self.seconds:g} s it was given were over")
 
 
-def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certificate:
+def certify(
+    solution: Solution | PhasesSolution, effort: CertifyOptions | None = None
+) -> Certificate:
     """Certify the optimal value of the problem that a solution solves.
 
     Methods that differ in what they discretise and solve are taken to the end, as far as they
@@ -128,7 +131,8 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
     optimum being the global one.
 
     Args:
-        solution: near the optimum that is to be certified; of any method.
+        solution: near the optimum that is to be certified; of any method. Of ``Phases`` the
+            certificate is that of all side by side, and its solution that one's.
         effort: default ``CertifyOptions()``.
 
     Returns:
@@ -139,8 +143,12 @@ def certify(solution: Solution, effort: CertifyOptions | None = None) -> Certifi
             or no method answers.
     """
     effort = effort or CertifyOptions()
-    check_instance(solution, Solution, "certify: solution")
+    check_instance(solution, (Solution, PhasesSolution), "certify: solution")
     check_instance(effort, CertifyOptions, "certify: effort")
+    if isinstance(solution, PhasesSolution):
+        found = certify(solution.whole, effort)
+        smooth = found.estimates[0].is_extremal
+        return with_phases(found, solution, _SMOOTH_VIOLATION if smooth else _OTHER_VIOLATION)
     form = normal_form(solution.problem)
     if form is not None:
         return _in_terms_of_the_user(solution, effort, InNormalForm(form))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -76,6 +77,8 @@ class Collocation(ScalingSolver):
             ``MPC``.
         feasibility_restoration: see ``MultipleShooting``; off in a control loop.
     """
+
+    takes_phases: ClassVar[bool] = True
 
     intervals: int = 25
     degree: int = 4

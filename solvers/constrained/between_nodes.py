@@ -90,20 +90,18 @@ class BetweenNodes(ScalingSolver):
         """Build what the inner solver would, at its nodes."""
         return self.inner.least_violating(ocp)
 
-    def build(self, ocp: OCP) -> Program:
+    def refuse_written(self, ocp: OCP) -> None:
         """Refuse soft constraints: their slack is held from node to node, and so is what it allows.
 
         Raises:
             UnsupportedProblem: naming the constraint.
         """
-        check_instance(ocp, OCP, "between nodes: the problem")
         for c in ocp.at("path"):
             if c.soft is not None:
                 raise UnsupportedProblem(
                     f"{ocp.name}: '{c.name}' is soft: it has a price between the nodes and is not "
                     f"held there; use {type(self.inner).__name__} itself"
                 )
-        return super().build(ocp)
 
     def prepare(self, ocp: OCP) -> "BetweenNodesProgram":
         """Give every path inequality and state bound its margin, and build that.

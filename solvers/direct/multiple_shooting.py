@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -62,6 +62,8 @@ class MultipleShooting(ScalingSolver):
             iterate if it is not; after that, try other first iterates. Each may cost 300
             iterations; turn it off in a controller with a deadline.
     """
+
+    takes_phases: ClassVar[bool] = True
 
     intervals: int = 75
     integrator: Integrator = field(default_factory=RK4)

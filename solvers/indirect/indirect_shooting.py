@@ -1,7 +1,7 @@
 """Indirect shooting: Newton-Raphson on the minimum principle's boundary value problem."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -51,6 +51,8 @@ class IndirectShooting(ScalingSolver):
         max_steps: limit of Newton steps (of each problem in a continuation).
         compiled: run the steps as machine code; the first build takes seconds, see ``compiled``.
     """
+
+    takes_phases: ClassVar[bool] = True
 
     segments: int = 1
     steps: int = 300

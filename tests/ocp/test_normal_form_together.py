@@ -168,3 +168,14 @@ def test_names_that_mean_two_things_are_refused():
 def test_a_plant_refuses_a_constant_that_nobody_has_chosen():
     with pytest.raises(ProblemError, match="'side' of line is an unknown constant"):
         Plant(ocp=VALLEYS)
+
+
+def test_of_the_start_only_what_terms_contain_is_copied():
+    lap = Constraint("lap", P - MASS.start[0], 1, 1, at="terminal")
+    ocp = OCP(
+        name="lap", model=MASS, x0=[3.0, 0], horizon=1.0, running_cost=U**2, constraints=(lap,)
+    )
+    found = solve(ocp, Collocation(4)).or_raise()
+    assert found.normal is not None
+    assert found.normal.x.shape[1] == 3
+    assert found.x[-1, 0] == pytest.approx(4.0, abs=1e-8)

@@ -1,0 +1,1 @@
+"""Problems one after another: their description, one problem made of them, and the way back."""
