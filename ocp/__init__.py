@@ -24,6 +24,7 @@ from ocp.mpc.record_format import Record
 from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
+from ocp.problem.grid import Grid
 from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
@@ -49,6 +50,7 @@ __all__ = [
     "FeedbackLaw",
     "FlightRecorder",
     "FreeTime",
+    "Grid",
     "Guess",
     "InitialGuess",
     "InputSource",

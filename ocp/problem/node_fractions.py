@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ocp.checks.errors import UnsupportedProblem
+from ocp.problem.grid import Grid
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Signal
 
@@ -15,23 +17,34 @@ _BENDS = 1e-9
 _HALVED = 4
 
 
-def node_fractions(ocp: OCP, intervals: int) -> np.ndarray:
+def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     """Return the nodes of N intervals as fractions of the horizon, (N + 1,).
 
-    They are equally spaced where the knots of all declared signals are among such nodes. Else
-    the intervals are shared out among the spaces between the knots, in proportion to their
-    lengths and at least one each, since the integration of an interval sees no jump inside it.
+    Those of a ``Grid`` are as they are. A number of intervals is equally spaced where the knots of
+    all declared signals are among such nodes. Else they are shared out among the spaces between
+    the knots, in proportion to their lengths and at least one each, since the integration of an
+    interval sees no jump inside it.
     Twice as many are then the same ones halved, unless as many equal ones hit the knots.
     Where there are more knots than intervals, those at which the declared samples bend are
     taken in, then those at which they jump, then none. In discrete time the steps are the nodes.
 
     Args:
         ocp: the problem.
-        intervals: N.
+        intervals: N, or the nodes.
+
+    Raises:
+        UnsupportedProblem: for a ``Grid`` in discrete time.
     """
-    uniform = np.linspace(0.0, 1.0, intervals + 1)
+    if isinstance(intervals, Grid):
+        if ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: the steps of the discrete-time model '{ocp.model.name}' are the "
+                "nodes, it takes no Grid; blocks hold its controls over several steps"
+            )
+        return np.array(intervals.fractions)
     if ocp.model.is_discrete:
-        return uniform
+        return np.linspace(0.0, 1.0, (ocp.steps or intervals) + 1)
+    uniform = np.linspace(0.0, 1.0, intervals + 1)
     for knots in _candidates(ocp):
         if (np.abs(knots[:, None] - uniform).min(axis=1, initial=1.0) <= _SAME).all():
             return uniform

@@ -16,7 +16,7 @@ from ocp import (
     linear_quadratic,
     solve,
 )
-from ocp.internal import RunData
+from ocp.internal import RunData, cut
 from solvers.certify.certificate import CONVEXITY, STARTS, Check, Estimate, Verdict
 from solvers.collocation.collocation import Collocation
 from solvers.direct.multiple_shooting import MultipleShooting
@@ -106,7 +106,7 @@ def other_starts(
         return Check.skipped(STARTS, f"none of {starts} starts led to a feasible optimum")
     cheapest = found[0].cost
     if _lead(best, cheapest) > _CHEAPER:  # by what the coarse grid violates, perhaps
-        finer = replace(solver, intervals=_FINER * solver.intervals)
+        finer = replace(solver, intervals=cut(solver.intervals, _FINER))
         cheapest = evaluate(solve(ocp, finer, guess=found[0].solution)).cost
     lead = _lead(best, cheapest)
     costs = ", ".join(f"{optimum.cost:.6g} ({optimum.found}x)" for optimum in found[:4])
