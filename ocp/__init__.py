@@ -26,6 +26,7 @@ from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
 from ocp.problem.grid import Grid
 from ocp.problem.guess import Guess
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
@@ -56,6 +57,7 @@ __all__ = [
     "InputSource",
     "Integrator",
     "InterpretedWarning",
+    "Measurement",
     "Midpoint",
     "MinimumPrinciple",
     "Model",

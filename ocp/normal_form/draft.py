@@ -8,6 +8,7 @@ import numpy as np
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import Steps
 from ocp.problem.scaled import sizes_of
 
 
@@ -79,6 +80,7 @@ class Draft:
         smoothness: of it.
         states: added ones.
         controls: added ones.
+        steps: added constants of the problem.
     """
 
     ocp: OCP
@@ -88,6 +90,7 @@ class Draft:
     smoothness: int
     states: list[AddedStates] = field(default_factory=list)
     controls: list[AddedControls] = field(default_factory=list)
+    steps: list[Steps] = field(default_factory=list)
 
     @classmethod
     def of(cls, ocp: OCP) -> "Draft":
@@ -127,7 +130,9 @@ class Draft:
             constraints=tuple(self.constraints),
             free_start=(*own, *added),
             start_bounds=start,
+            parameters=(*ocp.parameters, *self.steps),
             unknowns=(),
+            data=(),
             smoothness=self.smoothness,
             guess=None,
         )

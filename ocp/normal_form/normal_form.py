@@ -8,10 +8,12 @@ import numpy as np
 
 from ocp.normal_form.draft import Draft
 from ocp.normal_form.integral_constraints import add_integrals
+from ocp.normal_form.measurements import DataTerms, add_data
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
 
 
@@ -26,6 +28,7 @@ class NormalForm(Portable):
         integrals: where integrals stand among its states, by name of the constraint.
         start: where the state at the start stands among its states; nowhere where no term has it.
         slacks: what the controls behind the own ones stand for, in terms of these.
+        data: what measurements at instants have added; None: nothing.
     """
 
     original: OCP
@@ -34,6 +37,7 @@ class NormalForm(Portable):
     integrals: dict[str, slice]
     start: slice
     slacks: ca.SX
+    data: DataTerms | None = None
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -45,16 +49,54 @@ class NormalForm(Portable):
         m = self.original.model
         return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(self.slacks)])
 
+    def costate(
+        self,
+        x: np.ndarray,
+        costate: np.ndarray,
+        t: np.ndarray,
+        fractions: np.ndarray,
+        values: ParameterValues,
+    ) -> np.ndarray:
+        """Return costates (K, nx) of the original; where data are, the ones just before them.
+
+        Args:
+            x: states of the rewritten problem (K, n).
+            costate: of it (K, n).
+            t: instants [s], (K,).
+            fractions: the same as fractions of the horizon.
+            values: parameters of the rewritten problem.
+        """
+        own = costate[:, : self.original.model.nx]
+        if self.data is None:
+            return own
+        p = values.at(fractions, -1)
+        passed = np.array(self._data_terms.map(len(t))(x.T, t[None, :], p.T)[0]).T
+        return own - np.where(fractions[:, None] > 0.0, passed, 0.0)
+
+    def integrated_data(self, x: np.ndarray, t: float, values: ParameterValues) -> float:
+        """Return what data cost at the end and by the integral, for the last state (n,)."""
+        if self.data is None:
+            return 0.0
+        at_end = float(self._data_terms(x, t, values.at(1.0)[0])[1])
+        return at_end - float(x[self.data.integral])
+
+    @cached_property
+    def _data_terms(self) -> ca.Function:
+        assert self.data is not None
+        m, terms = self.problem.model, [self.data.slope, self.data.at_end]
+        return ca.Function("data", [m.x, m.t, self.problem.p], [ca.densify(e) for e in terms])
+
 
 @once_per_problem
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    if not (ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
+    if not (ocp.data or ocp.unknowns or ocp.at("integral") or ocp.refers_to_start or is_soft):
         return None
     draft = Draft.of(ocp)
     slacks = soften(draft)
     integrals = add_integrals(draft)
+    data = add_data(draft)
     start = add_start(draft)
     unknowns = add_unknowns(draft)
-    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, slacks)
+    return NormalForm(ocp, draft.problem(), unknowns, integrals, start, slacks, data)

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint, Soft
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
-from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.parameters import Parameter, Signal, Steps, Unknown
 
 
 class _Problem(Protocol):
@@ -65,7 +66,10 @@ class _Problem(Protocol):
     def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
-    def parameters(self) -> tuple[Parameter | Signal, ...]: ...
+    def parameters(self) -> tuple[Parameter | Signal | Steps, ...]: ...
+
+    @property
+    def data(self) -> tuple[Measurement, ...]: ...
 
 
 def describe(ocp: _Problem) -> str:
@@ -83,6 +87,8 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
     yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
     yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"
+    for each in ocp.data:
+        yield f"    + least squares of '{each.name}': {_measured(each)}"
     yield "  subject to"
     for name, row in zip(m.x_names, ca.vertsplit(m.f), strict=True):
         left = f"{name}[k+1]" if discrete else f"d({name})/dt"
@@ -103,6 +109,13 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     for entry in ocp.parameters:
         symbols, kind = ", ".join(element_names(entry.symbol)), type(entry).__name__.lower()
         yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
+
+
+def _measured(data: Measurement) -> str:
+    """Say what was measured, and when."""
+    rows = ", ".join(readable(row) for row in ca.vertsplit(data.expression))
+    times = np.asarray(data.times)
+    return f"{rows} at {_count(len(times), 'instant')}, t = {times[0]:g} to {times[-1]:g}"
 
 
 def _unknown(entry: Unknown) -> str:

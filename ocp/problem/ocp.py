@@ -19,11 +19,13 @@ from ocp.problem.constraint_rows import (
     ProblemRows,
     depends_on,
 )
+from ocp.problem.data_checks import check_data
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
@@ -31,6 +33,7 @@ from ocp.problem.parameters import (
     ParameterValues,
     Signal,
     StartValue,
+    Steps,
     Unknown,
 )
 from ocp.problem.portable import Portable
@@ -75,6 +78,7 @@ class OCP(Portable):
             referee reports how far a solution strays.
         parameters: constants and sampled signals that may change from run to run.
         unknowns: constants that the optimiser chooses.
+        data: measurements at instants; the cost gains their least squares.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -94,8 +98,9 @@ class OCP(Portable):
     free_start: tuple[str, ...] = ()
     start_bounds: Box = field(default_factory=Box)
     invariants: tuple[Constraint, ...] = ()
-    parameters: tuple[Parameter | Signal, ...] = ()
+    parameters: tuple[Parameter | Signal | Steps, ...] = ()
     unknowns: tuple[Unknown, ...] = ()
+    data: tuple[Measurement, ...] = ()
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -130,6 +135,11 @@ class OCP(Portable):
         """What stands in p: parameters and signals, unknown constants, the state at the start."""
         start = (StartValue(self.model.start, self.start()),) if self.refers_to_start else ()
         return (*self.parameters, *self.unknowns, *start)
+
+    @property
+    def moving(self) -> tuple[Signal | Steps, ...]:
+        """The parameters that change along the horizon."""
+        return tuple(e for e in self.parameters if isinstance(e, Signal | Steps))
 
     @cached_property
     def refers_to_start(self) -> bool:
@@ -229,6 +239,7 @@ class OCP(Portable):
             terminal_cost=ca.SX(self.terminal_cost) + price(self.at("terminal")),
             constraints=self.constraints,
             invariants=self.invariants,
+            data=self.data,
         )
 
     @cached_property
@@ -339,7 +350,7 @@ class OCP(Portable):
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
-        parts = (self.model, *self.constraints, *self.invariants)
+        parts = (self.model, *self.constraints, *self.invariants, *self.data)
         return [*super().expressions(), *(e for part in parts for e in part.expressions())]
 
     def describe(self) -> str:
@@ -358,8 +369,9 @@ class OCP(Portable):
         for what, kind in (
             ("constraints", Constraint),
             ("invariants", Constraint),
-            ("parameters", (Parameter, Signal)),
+            ("parameters", (Parameter, Signal, Steps)),
             ("unknowns", Unknown),
+            ("data", Measurement),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")
@@ -394,7 +406,8 @@ class OCP(Portable):
         self.start_box.sized(model.nx, f"{name}: bounds of the start")
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
-        terms = [model.f, *costs, *[c.expression for c in self.constraints]]
+        check_data(self, self.entries)
+        terms = [c.expression for c in (*self.constraints, *self.data)] + [model.f, *costs]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
 

@@ -8,7 +8,6 @@ import numpy as np
 from ocp import (
     OCP,
     ProblemError,
-    Signal,
     Solution,
     UnsupportedProblem,
     discretise,
@@ -132,7 +131,7 @@ def every_extremal(best: Estimate) -> Check:
     ocp = best.solution.problem
     if not ocp.invariants:
         return Check.skipped(EXTREMALS, "the problem keeps no manifold to scan")
-    signals = [entry.name for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.name for entry in ocp.moving]
     if signals:
         return Check.skipped(EXTREMALS, f"signal '{signals[0]}' is not scanned")
     try:
