@@ -7,6 +7,7 @@ from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import closed_loop
 from ocp.codegen.compile import Compiler, InterpretedWarning
+from ocp.estimation.estimate import Estimate, estimate
 from ocp.files.archive import whole_arrays
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
@@ -46,6 +47,7 @@ __all__ = [
     "Controller",
     "DamagedFile",
     "Decision",
+    "Estimate",
     "Euler",
     "Evaluation",
     "FeedbackLaw",
@@ -84,6 +86,7 @@ __all__ = [
     "closed_loop",
     "costates_along",
     "discretise",
+    "estimate",
     "evaluate",
     "instantaneous",
     "linear_quadratic",
