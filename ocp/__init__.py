@@ -7,6 +7,7 @@ from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import closed_loop
 from ocp.codegen.compile import Compiler, InterpretedWarning
+from ocp.estimation.estimate import Estimate, estimate
 from ocp.files.archive import whole_arrays
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
@@ -27,7 +28,9 @@ from ocp.phases.phases_solution import PhasesSolution
 from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
+from ocp.problem.grid import Grid
 from ocp.problem.guess import Guess
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
@@ -48,17 +51,20 @@ __all__ = [
     "Controller",
     "DamagedFile",
     "Decision",
+    "Estimate",
     "Euler",
     "Evaluation",
     "FeedbackLaw",
     "FlightRecorder",
     "FreeTime",
+    "Grid",
     "Guess",
     "InitialGuess",
     "InputSource",
     "Integrator",
     "InterpretedWarning",
     "Link",
+    "Measurement",
     "Midpoint",
     "MinimumPrinciple",
     "Model",
@@ -89,6 +95,7 @@ __all__ = [
     "closed_loop",
     "costates_along",
     "discretise",
+    "estimate",
     "evaluate",
     "instantaneous",
     "linear_quadratic",

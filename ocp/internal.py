@@ -23,6 +23,7 @@ from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
+from ocp.method.blocking_solver import BlockingSolver
 from ocp.method.in_normal_form import InNormalForm
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
@@ -45,8 +46,10 @@ from ocp.problem.constraint_rows import (
     ImposedRows,
     Violation,
 )
+from ocp.problem.control_blocks import ControlBlocks
 from ocp.problem.elastic import elastic
 from ocp.problem.epigraph import Epigraph, epigraph
+from ocp.problem.grid import check_intervals, cut, number_of
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
@@ -65,11 +68,13 @@ __all__ = [
     "ACCURACY",
     "QUIET",
     "AlgebraicControls",
+    "BlockingSolver",
     "BufferedFunction",
     "BufferedNlp",
     "BuiltProgram",
     "ConstraintRow",
     "ConstraintRows",
+    "ControlBlocks",
     "Epigraph",
     "ImposedRows",
     "InNormalForm",
@@ -101,12 +106,14 @@ __all__ = [
     "check_choice",
     "check_flag",
     "check_instance",
+    "check_intervals",
     "check_not_negative",
     "check_numbers",
     "check_positive",
     "check_real",
     "check_whole",
     "compiled",
+    "cut",
     "differentiable_step",
     "elastic",
     "elevated",
@@ -122,6 +129,7 @@ __all__ = [
     "node_fractions",
     "node_widths",
     "normal_form",
+    "number_of",
     "refuse_free_ends",
     "refuse_state_bounds",
     "replacing",

@@ -11,7 +11,7 @@ from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.linear.structure import Terms, read_terms
 from ocp.problem.constraint import Constraint
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import Parameter, Signal
+from ocp.problem.parameters import Parameter, Signal, Steps
 
 # A horizon that is a multiple of dt up to this is one.
 _MULTIPLE = 1e-9
@@ -126,7 +126,7 @@ def _refuse_time(ocp: OCP, terms: Terms) -> None:
                 )
 
 
-def _resampled(entry: Parameter | Signal, steps: int) -> Parameter | Signal:
+def _resampled(entry: Parameter | Signal | Steps, steps: int) -> Parameter | Signal | Steps:
     """Return a signal with one sample per step; nothing is lost."""
     if not isinstance(entry, Signal) or len(entry.value) == steps + 1:
         return entry

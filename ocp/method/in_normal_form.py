@@ -12,6 +12,7 @@ from ocp.checks.errors import ProblemError
 from ocp.method.own_controls import own_controls
 from ocp.method.rewriting import Rewriting, RewrittenGuess
 from ocp.normal_form.normal_form import NormalForm
+from ocp.problem.data_residuals import data_cost
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
@@ -67,18 +68,24 @@ class InNormalForm(Rewriting):
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""
-        original, m = self.original, self.original.model
-        last = {} if original.last_input is None else {_LAST: found.x0[self.form.last_input]}
-        return found.with_(
+        original, m, form = self.original, self.original.model, self.form
+        values = found.data.values
+        last = {} if original.last_input is None else {_LAST: found.x0[form.last_input]}
+        written = found.with_(
             problem=original,
             x=found.x[:, : m.nx],
             x0=found.x0[: m.nx],
-            costate=found.costate[:, : m.nx],
-            **own_controls(self.form, found),
+            costate=form.costate(found.x, found.costate, found.t, found.fractions, values),
+            **own_controls(form, found),
             parameters={**found.parameters, **last},
-            unknowns={name: found.x[0, at] for name, at in self.form.unknowns.items()},
+            unknowns={name: found.x[0, at] for name, at in form.unknowns.items()},
             normal=found,
         )
+        if form.data is None:
+            return written
+        # Of a sum of squares that is small, two integrals that nearly cancel have few digits.
+        once = form.integrated_data(found.x[-1], found.t[-1], values)
+        return written.with_(cost=found.cost - once + data_cost(written.residuals))
 
     def written(self, solution: Solution) -> Solution:
         """Return the solution in normal form, which a solver's answer keeps.

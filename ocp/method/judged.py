@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.problem.constraint_rows import ConstraintRows, Violation
+from ocp.problem.data_residuals import data_size
 from ocp.problem.parameters import Signal
 from ocp.problem.scaled import sizes_of
 from ocp.referee.evaluate import Evaluation, evaluate
@@ -81,7 +82,8 @@ def _growth(verdict: Evaluation) -> str:
 def _cost_fault(solution: Solution, verdict: Evaluation, accuracy: float) -> str:
     own, cost, error = solution.cost, verdict.cost, verdict.cost_error
     most = max(abs(own - cost), error)
-    if most <= accuracy * abs(cost) or most <= accuracy * _ZERO * sizes_of(solution.problem).cost:
+    size = sizes_of(solution.problem).cost + data_size(solution.problem)
+    if most <= accuracy * abs(cost) or most <= accuracy * _ZERO * size:
         return ""
     if abs(own - cost) >= error:
         return f"own cost {own:.6g}, the referee's {cost:.6g}"

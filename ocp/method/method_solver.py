@@ -11,6 +11,7 @@ from ocp.checks.interrupts import interruptible
 from ocp.method.in_normal_form import InNormalForm
 from ocp.method.rewriting import Rewriting, RewrittenProgram
 from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.problem.grid import Grid
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
 from ocp.solution.composite import CompositeProblem, CompositeProgram, S
@@ -90,10 +91,10 @@ class MethodSolver(Solver):
         """By how much a terminal constraint may be missed in any case, in its own unit."""
         return 0.0
 
-    def nodes(self, ocp: OCP, intervals: int) -> np.ndarray:
+    def nodes(self, ocp: OCP, intervals: int | Grid) -> np.ndarray:
         """Return the nodes of a grid as fractions of the horizon, (N + 1,)."""
-        if not self.takes_knots:
-            return np.linspace(0.0, 1.0, intervals + 1)
+        if not (self.takes_knots or isinstance(intervals, Grid)):
+            return np.linspace(0.0, 1.0, (ocp.steps or intervals) + 1)
         return node_fractions(ocp, intervals)
 
     def judging(self, rewriting: Rewriting, program: Program) -> RewrittenProgram:

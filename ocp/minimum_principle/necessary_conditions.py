@@ -15,7 +15,6 @@ from ocp.problem.constraint import Constraint
 from ocp.problem.functions import stacked
 from ocp.problem.kinks import kink_in_control
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import Signal
 from ocp.problem.scaled import scaled
 
 # H_uu with a smaller reciprocal condition number does not determine the control.
@@ -67,7 +66,7 @@ def minimum_principle(ocp: OCP) -> MinimumPrinciple:
         raise UnsupportedProblem(
             f"{ocp.name}: the minimum principle here is that of continuous time"
         )
-    signals = [entry.name for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.name for entry in ocp.moving]
     if ocp.has_free_time and signals:
         raise UnsupportedProblem(
             f"{ocp.name}: signal '{signals[0]}' stretches with the free final time, which "

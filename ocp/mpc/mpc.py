@@ -199,6 +199,11 @@ class MPC:
                 f"MPC of {name}: '{self.ocp.unknowns[0].name}' is an unknown constant, which every "
                 "step would choose anew: solve for it once, and make it a Parameter of that value"
             )
+        if self.ocp.data:
+            raise UnsupportedProblem(
+                f"MPC of {name}: the data '{self.ocp.data[0].name}' are of one horizon, a "
+                "loop's moves: estimate first, and make what was unknown a Parameter"
+            )
         if integrals := self.ocp.at("integral"):
             raise UnsupportedProblem(
                 f"MPC of {name}: the integral constraint '{integrals[0].name}' would begin anew at "

@@ -181,11 +181,11 @@ class PlanCheck:
             p: of the horizon.
             to_its_end: whether those of the end are checked.
         """
-        times = t + plan.t - plan.t[0]
-        left = int((times[:-1] < plan.t[-1] - ROUNDING * self.dt).sum())
+        later = plan.t[plan.t > t + ROUNDING * self.dt]
+        left = len(later)
         if not left:
             return np.inf, "nothing is left of it"
-        times = times[: left + 1]
+        times = np.append(t, later)
         u, model = plan_controls(plan, times[:-1]), self._rollout(left)
         result = model.of(start, u, times, p.between(times))
         found = result.excess, result.worst

@@ -11,6 +11,7 @@ import numpy as np
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import Steps
 from ocp.problem.scaled import sizes_of
 
 
@@ -85,6 +86,7 @@ class Draft:
         states: added ones.
         controls: added ones.
         moved: controls of its own that are states now: where each one stands among all states.
+        steps: added constants of the problem.
     """
 
     ocp: OCP
@@ -95,6 +97,7 @@ class Draft:
     states: list[AddedStates] = field(default_factory=list)
     controls: list[AddedControls] = field(default_factory=list)
     moved: dict[int, int] = field(default_factory=dict)
+    steps: list[Steps] = field(default_factory=list)
 
     @classmethod
     def of(cls, ocp: OCP) -> "Draft":
@@ -145,9 +148,11 @@ class Draft:
             constraints=tuple(self.constraints),
             free_start=(*own, *added),
             start_bounds=start,
+            parameters=(*ocp.parameters, *self.steps),
             unknowns=(),
             rates=(),
             last_input=None,
+            data=(),
             smoothness=self.smoothness,
             guess=None,
         )

@@ -9,10 +9,12 @@ import numpy as np
 from ocp.normal_form.draft import Draft
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
+from ocp.normal_form.measurements import DataTerms, add_data
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
+from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
 
 
@@ -31,6 +33,7 @@ class NormalForm(Portable):
         controls: where the own controls stand among its states and controls, (nu,).
         rates: which of its controls are the rates of those that are states, in their order.
         last_input: where the states stand that start at the last input.
+        data: what measurements at instants have added; None: nothing.
     """
 
     original: OCP
@@ -53,6 +56,8 @@ class NormalForm(Portable):
         """The one that methods get: the algebraic variables are solved for."""
         return self.implicit.explicit
 
+    data: DataTerms | None = None
+
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
         return x[list(self.from_start)]
@@ -63,18 +68,56 @@ class NormalForm(Portable):
         m, slacks = self.original.model, self.original.algebraic_solution(self.slacks)
         return ca.Function("slack", [m.x, m.u, m.t, self.original.p], [ca.densify(slacks)])
 
+    def costate(
+        self,
+        x: np.ndarray,
+        costate: np.ndarray,
+        t: np.ndarray,
+        fractions: np.ndarray,
+        values: ParameterValues,
+    ) -> np.ndarray:
+        """Return costates (K, nx) of the original; where data are, the ones just before them.
+
+        Args:
+            x: states of the rewritten problem (K, n).
+            costate: of it (K, n).
+            t: instants [s], (K,).
+            fractions: the same as fractions of the horizon.
+            values: parameters of the rewritten problem.
+        """
+        own = costate[:, : self.original.model.nx]
+        if self.data is None:
+            return own
+        p = values.at(fractions, -1)
+        passed = np.array(self._data_terms.map(len(t))(x.T, t[None, :], p.T)[0]).T
+        return own - np.where(fractions[:, None] > 0.0, passed, 0.0)
+
+    def integrated_data(self, x: np.ndarray, t: float, values: ParameterValues) -> float:
+        """Return what data cost at the end and by the integral, for the last state (n,)."""
+        if self.data is None:
+            return 0.0
+        at_end = float(self._data_terms(x, t, values.at(1.0)[0])[1])
+        return at_end - float(x[self.data.integral])
+
+    @cached_property
+    def _data_terms(self) -> ca.Function:
+        assert self.data is not None
+        m, terms = self.problem.model, [self.data.slope, self.data.at_end]
+        return ca.Function("data", [m.x, m.t, self.problem.p], [ca.densify(e) for e in terms])
+
 
 @once_per_problem
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    added = ocp.model.nz or ocp.unknowns or ocp.rates or ocp.at("integral") or is_soft
-    if not (added or ocp.refers_to_start):
+    added = ocp.model.nz or ocp.rates or ocp.data or ocp.unknowns or ocp.at("integral")
+    if not (added or is_soft or ocp.refers_to_start):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
+    data = add_data(draft)
     from_start = ocp.used_of_start
     start = add_start(draft, from_start)
     unknowns = add_unknowns(draft)
@@ -89,4 +132,5 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         controls=draft.own_controls(),
         rates=len(draft.kept) + np.arange(len(draft.moved)),
         last_input=last_input,
+        data=data,
     )

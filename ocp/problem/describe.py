@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint, Soft
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
-from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.parameters import Parameter, Signal, Steps, Unknown
 from ocp.problem.rate import ControlRates
 
 
@@ -72,7 +73,10 @@ class _Problem(Protocol):
     def last_input(self) -> ArrayLike | None: ...
 
     @property
-    def parameters(self) -> tuple[Parameter | Signal, ...]: ...
+    def parameters(self) -> tuple[Parameter | Signal | Steps, ...]: ...
+
+    @property
+    def data(self) -> tuple[Measurement, ...]: ...
 
 
 def describe(ocp: _Problem) -> str:
@@ -92,6 +96,8 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
     yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
     yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"
+    for each in ocp.data:
+        yield f"    + least squares of '{each.name}': {_measured(each)}"
     yield "  subject to"
     for name, row in zip(m.x_names, ca.vertsplit(m.f), strict=True):
         left = f"{name}[k+1]" if discrete else f"d({name})/dt"
@@ -128,6 +134,13 @@ def _rates(ocp: _Problem) -> Iterable[str]:
         said = [f"at {w:g} ({change})^2"] if w > 0.0 else []
         said += ["last input free" if last is None else f"last input {np.asarray(last)[i]:g}"]
         yield f"    {between(low, change, high)}   ({', '.join(said)})"
+
+
+def _measured(data: Measurement) -> str:
+    """Say what was measured, and when."""
+    rows = ", ".join(readable(row) for row in ca.vertsplit(data.expression))
+    times = np.asarray(data.times)
+    return f"{rows} at {_count(len(times), 'instant')}, t = {times[0]:g} to {times[-1]:g}"
 
 
 def unknown_in_words(entry: Unknown) -> str:

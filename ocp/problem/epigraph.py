@@ -17,7 +17,7 @@ from ocp.checks.expressions import readable
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import ParameterValues, Signal
+from ocp.problem.parameters import ParameterValues
 from ocp.problem.walk import applied, walk
 
 _MAXIMA = (ca.OP_FABS, ca.OP_FMAX, ca.OP_FMIN)
@@ -270,7 +270,7 @@ def _has_maximum(ocp: OCP) -> bool:
 
 def _bends(weight: ca.SX, ocp: OCP) -> bool:
     """Whether a weight is not affine in the signals: between knots it might be negative."""
-    signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.symbol for entry in ocp.moving]
     if not signals:
         return False
     return any(ca.which_depends(ca.vec(weight), ca.vertcat(*signals), 2, True))
@@ -281,5 +281,5 @@ def _changing(ocp: OCP) -> ca.SX:
     m = ocp.model
     if m.is_discrete:
         return ca.SX(0, 1)
-    signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.symbol for entry in ocp.moving]
     return ca.vertcat(m.x, m.t, *signals)

@@ -56,6 +56,10 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
         bounds = [_stacked(c) for c in ocp.at(at)]
         if (name := f"{at} constraints") in parts:
             parts[name] = np.concatenate([parts[name], *bounds])
+    if ocp.data:
+        here = [functions.measured(x, t, p) for x, _, t, p in points]
+        numbers = [n for m in ocp.data for n in (m.times, m.values, m.sigma)]
+        parts["data"] = np.concatenate([np.ravel(np.array(v)) for v in (*here, *numbers)])
     if ocp.unknowns:
         parts["unknown constants"] = np.concatenate([_stacked(e.box) for e in ocp.unknowns])
     if len(rates := ocp.control_rates):

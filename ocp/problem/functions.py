@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ocp.problem.constraint import Constraint, Place
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 
 
@@ -29,6 +30,7 @@ class Functions:
         integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
         algebraic: the algebraic variables (nz,).
+        measured: what is measured, stacked; of (x, t, p).
     """
 
     rate: ca.Function
@@ -43,6 +45,7 @@ class Functions:
     integrands: ca.Function
     invariants: ca.Function
     algebraic: ca.Function
+    measured: ca.Function
 
     @classmethod
     def of(
@@ -55,6 +58,7 @@ class Functions:
         constraints: Sequence[Constraint],
         invariants: Sequence[Constraint],
         algebraic: ca.SX,
+        data: Sequence[Measurement],
     ) -> "Functions":
         """Build them from the parts of a problem without algebraic variables, and those.
 
@@ -86,9 +90,10 @@ class Functions:
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
             algebraic=along("algebraic", algebraic),
+            measured=at_an_end("measured", stacked(data)),
         )
 
 
-def stacked(constraints: Iterable[Constraint]) -> ca.SX:
-    """Return the expressions of several constraints as one column."""
+def stacked(constraints: Iterable[Constraint | Measurement]) -> ca.SX:
+    """Return the expressions of several constraints, or measurements, as one column."""
     return ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.problem.grid import Grid
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import Signal
+from ocp.problem.parameters import Signal, Steps
 
 # Nodes that differ by less are the same, in fractions of the horizon.
 _SAME = 1e-9
@@ -15,23 +17,41 @@ _BENDS = 1e-9
 _HALVED = 4
 
 
-def node_fractions(ocp: OCP, intervals: int) -> np.ndarray:
+def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     """Return the nodes of N intervals as fractions of the horizon, (N + 1,).
 
-    They are equally spaced where the knots of all declared signals are among such nodes. Else
-    the intervals are shared out among the spaces between the knots, in proportion to their
-    lengths and at least one each, since the integration of an interval sees no jump inside it.
+    Those of a ``Grid`` are as they are. A number of intervals is equally spaced where the knots of
+    all declared signals are among such nodes. Else they are shared out among the spaces between
+    the knots, in proportion to their lengths and at least one each, since the integration of an
+    interval sees no jump inside it.
     Twice as many are then the same ones halved, unless as many equal ones hit the knots.
     Where there are more knots than intervals, those at which the declared samples bend are
     taken in, then those at which they jump, then none. In discrete time the steps are the nodes.
 
     Args:
         ocp: the problem.
-        intervals: N.
+        intervals: N, or the nodes.
+
+    Raises:
+        UnsupportedProblem: for a ``Grid`` in discrete time.
+        ProblemError: where instants of data are no nodes.
     """
-    uniform = np.linspace(0.0, 1.0, intervals + 1)
+    if isinstance(intervals, Grid):
+        if ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: the steps of the discrete-time model '{ocp.model.name}' are the "
+                "nodes, it takes no Grid; blocks hold its controls over several steps"
+            )
+        return _with_steps(ocp, np.array(intervals.fractions))
     if ocp.model.is_discrete:
-        return uniform
+        return np.linspace(0.0, 1.0, (ocp.steps or intervals) + 1)
+    uniform = np.linspace(0.0, 1.0, intervals + 1)
+    count = len(_steps(ocp))
+    if count >= intervals:
+        raise ProblemError(
+            f"{ocp.name}: the {count} instants of its data need more than {count} intervals, not "
+            f"{intervals}"
+        )
     for knots in _candidates(ocp):
         if (np.abs(knots[:, None] - uniform).min(axis=1, initial=1.0) <= _SAME).all():
             return uniform
@@ -51,9 +71,29 @@ def node_widths(nodes: np.ndarray) -> np.ndarray:
 def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
     """Yield inner knots: all, where the samples bend, where they jump; fewer and fewer."""
     signals = [entry for entry in ocp.parameters if isinstance(entry, Signal)]
+    steps = _steps(ocp)
     for which in (_all, _bending, _jumping):
-        found = np.sort(np.concatenate([np.zeros(0), *[which(signal) for signal in signals]]))
+        each = [which(signal) for signal in signals]
+        found = np.sort(np.concatenate([steps, *each]))
         yield found[np.diff(found, prepend=0.0) > _SAME]
+
+
+def _steps(ocp: OCP) -> np.ndarray:
+    """Return the instants inside the horizon at which data are, (K,)."""
+    each = [entry.inner for entry in ocp.parameters if isinstance(entry, Steps)]
+    return np.concatenate([np.zeros(0), *each])
+
+
+def _with_steps(ocp: OCP, nodes: np.ndarray) -> np.ndarray:
+    """Return nodes that a user gave, if the instants of data are among them."""
+    apart = np.abs(_steps(ocp)[:, None] - nodes).min(axis=1) > _SAME
+    if apart.any():
+        missing = float(_steps(ocp)[apart.argmax()])
+        raise ProblemError(
+            f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where data are: "
+            "add it by Grid.with_nodes"
+        )
+    return nodes
 
 
 def _all(signal: Signal) -> np.ndarray:

@@ -20,11 +20,13 @@ from ocp.problem.constraint_rows import (
     ProblemRows,
     depends_on,
 )
+from ocp.problem.data_checks import check_data
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
 from ocp.problem.functions import Functions
 from ocp.problem.guess import Guess, check_guess
+from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
@@ -33,6 +35,7 @@ from ocp.problem.parameters import (
     ParameterValues,
     Signal,
     StartValue,
+    Steps,
     Unknown,
 )
 from ocp.problem.portable import Portable
@@ -84,6 +87,7 @@ class OCP(Portable):
         last_input: what the controls that have a ``Rate`` were just before the start, in their
             order in the model (m,): the rate holds from there on. It is a run argument,
             ``run(parameters={"last_input": ...})``; None: the optimiser chooses it.
+        data: measurements at instants; the cost gains their least squares.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -103,10 +107,11 @@ class OCP(Portable):
     free_start: tuple[str, ...] = ()
     start_bounds: Box = field(default_factory=Box)
     invariants: tuple[Constraint, ...] = ()
-    parameters: tuple[Parameter | Signal, ...] = ()
+    parameters: tuple[Parameter | Signal | Steps, ...] = ()
     unknowns: tuple[Unknown, ...] = ()
     rates: tuple[Rate, ...] = ()
     last_input: ArrayLike | None = None
+    data: tuple[Measurement, ...] = ()
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -143,8 +148,13 @@ class OCP(Portable):
         start = (StartValue(self.model.start, self.start()),) if self.refers_to_start else ()
         return (*self.given, *self.unknowns, *start)
 
+    @property
+    def moving(self) -> tuple[Signal | Steps, ...]:
+        """The parameters that change along the horizon."""
+        return tuple(e for e in self.parameters if isinstance(e, Signal | Steps))
+
     @cached_property
-    def given(self) -> tuple[Parameter | Signal | LastInput, ...]:
+    def given(self) -> tuple[Parameter | Signal | Steps | LastInput, ...]:
         """What a run gives by name: parameters and signals, and the last input."""
         if self.last_input is None:
             return self.parameters
@@ -270,7 +280,7 @@ class OCP(Portable):
         return AlgebraicSolution.of(self.model)
 
     def terms(self, rewritten: Callable[[ca.SX | float], ca.SX]) -> dict[str, Any]:
-        """Return costs, constraints and invariants with every expression rewritten."""
+        """Return costs, constraints, invariants and data with every expression rewritten."""
 
         def each(constraints: tuple[Constraint, ...]) -> tuple[Constraint, ...]:
             return tuple(replace(c, expression=rewritten(c.expression)) for c in constraints)
@@ -280,6 +290,7 @@ class OCP(Portable):
             "terminal_cost": rewritten(self.terminal_cost),
             "constraints": each(self.constraints),
             "invariants": each(self.invariants),
+            "data": tuple(replace(m, expression=rewritten(m.expression)) for m in self.data),
         }
 
     @cached_property
@@ -293,6 +304,7 @@ class OCP(Portable):
             terminal_cost=ca.SX(plain.terminal_cost) + price(plain.at("terminal")),
             constraints=plain.constraints,
             invariants=plain.invariants,
+            data=plain.data,
             algebraic=self.algebraic_solution.values,
         )
 
@@ -395,7 +407,7 @@ class OCP(Portable):
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
-        parts = (self.model, *self.constraints, *self.invariants)
+        parts = (self.model, *self.constraints, *self.invariants, *self.data)
         return [*super().expressions(), *(e for part in parts for e in part.expressions())]
 
     def describe(self) -> str:
@@ -414,9 +426,10 @@ class OCP(Portable):
         for what, kind in (
             ("constraints", Constraint),
             ("invariants", Constraint),
-            ("parameters", (Parameter, Signal)),
+            ("parameters", (Parameter, Signal, Steps)),
             ("unknowns", Unknown),
             ("rates", Rate),
+            ("data", Measurement),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")
@@ -465,12 +478,18 @@ class OCP(Portable):
         self.start_box.sized(model.nx, f"{name}: bounds of the start")
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
-        terms = [model.f, model.algebraic, *costs, *[c.expression for c in self.constraints]]
+        check_data(self, self.entries)
+        terms = [c.expression for c in (*self.constraints, *self.data)]
+        terms += [model.f, model.algebraic, *costs]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
         if model.nz:
-            values = self.algebraic_solution.values
-            check_ends(name, model, values, costs[1], self.constraints, self.invariants)
+            at_ends = [c for c in self.constraints if c.at in ("initial", "terminal")]
+            named = [(f"{c.at} constraint '{c.name}'", c.expression) for c in at_ends]
+            named += [(f"invariant '{c.name}'", c.expression) for c in self.invariants]
+            named += [(f"measurement '{c.name}'", c.expression) for c in self.data]
+            named.append(("terminal_cost", costs[1]))
+            check_ends(name, model, self.algebraic_solution.values, named)
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""

@@ -208,8 +208,38 @@ class Signal(Portable):
         return samples[np.clip(index, 0, last)]
 
 
+@dataclass(frozen=True, eq=False)
+class Steps(Portable):
+    """A constant that has another value behind each of some instants; no run changes it.
+
+    Args:
+        name: of it.
+        symbol: ``SX`` column (m,).
+        inner: the instants, as fractions of the horizon inside it, (K,).
+        value: before the first, behind each, (K + 1, m).
+    """
+
+    name: str
+    symbol: ca.SX
+    inner: np.ndarray
+    value: np.ndarray
+
+    @property
+    def knots(self) -> np.ndarray:
+        """Instants in [0, 1] between which it is constant."""
+        return np.array([0.0, *self.inner, 1.0])
+
+    def checked(self, value: ArrayLike) -> np.ndarray:
+        """Return the values as an array."""
+        return np.asarray(value)
+
+    def at(self, value: np.ndarray, fraction: np.ndarray, side: Literal[-1, 1]) -> np.ndarray:
+        """Return the value at each fraction of the horizon, (len(fraction), m)."""
+        return value[np.searchsorted(self.inner, np.asarray(fraction) + side * _SAME_NODE)]
+
+
 # What stands in the vector p of a problem.
-Entry = Parameter | Signal | LastInput | Unknown | StartValue
+Entry = Parameter | Signal | Steps | LastInput | Unknown | StartValue
 
 
 @dataclass(frozen=True)
@@ -250,8 +280,9 @@ class ParameterValues:
 
     def samples(self, count: int) -> np.ndarray:
         """Return the stacked vector where every signal has ``count`` samples, (count, n_p)."""
+        nodes = np.linspace(0.0, 1.0, count)
         blocks = [
-            v if isinstance(e, Signal) else np.broadcast_to(v, (count, len(v)))
+            v if isinstance(e, Signal) else e.at(v, nodes, 1)
             for e, v in zip(self.entries, self.values, strict=True)
         ]
         return np.hstack(blocks) if blocks else np.empty((count, 0))

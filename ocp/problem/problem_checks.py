@@ -62,30 +62,18 @@ def check_symbols(
             raise ProblemError(f"{owner}: invariant '{c.name}' must hold at='path'")
 
 
-def check_ends(
-    owner: str,
-    model: Model,
-    values: ca.SX,
-    terminal_cost: ca.SX,
-    constraints: Iterable[Constraint],
-    invariants: Iterable[Constraint],
-) -> None:
+def check_ends(owner: str, model: Model, values: ca.SX, terms: Iterable[tuple[str, ca.SX]]) -> None:
     """Refuse an algebraic variable that depends on a control where there is none.
 
     Args:
         owner: name of the problem.
         model: its dynamics.
         values: the algebraic variables in terms of everything else (nz,).
-        terminal_cost: it holds at the end.
-        constraints: of any place.
-        invariants: they contain no control.
+        terms: what contains no control: what a message calls it, and its expression.
     """
     each = zip(ca.vertsplit(model.z), ca.vertsplit(values), strict=True)
     moved = [z for z, value in each if ca.depends_on(value, model.u)]
-    at_ends = [c for c in constraints if c.at in ("initial", "terminal")]
-    terms = [(f"{c.at} constraint '{c.name}'", c.expression) for c in at_ends]
-    terms += [(f"invariant '{c.name}'", c.expression) for c in invariants]
-    for what, expression in [("terminal_cost", terminal_cost), *terms]:
+    for what, expression in terms:
         for z in moved:
             if ca.depends_on(expression, z):
                 raise ProblemError(

@@ -5,7 +5,7 @@ import numpy as np
 
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import ParameterValues, Signal
+from ocp.problem.parameters import ParameterValues
 from ocp.problem.switches import operations
 
 # Instants at which every difference is looked at, and halvings of what lies between two.
@@ -74,7 +74,7 @@ def _with_nearest(d, looks: np.ndarray, values: np.ndarray) -> tuple[np.ndarray,
 def _differences(ocp: OCP) -> ca.Function | None:
     """Return (t, p) -> what is zero where a comparison of time alone changes, or None."""
     m = ocp.model
-    signals = [entry.symbol for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.symbol for entry in ocp.moving]
     others = ca.vertcat(m.x, m.u, *signals)
     terms = [m.f, ca.SX(ocp.running_cost), *[c.expression for c in ocp.at("path")]]
     found: dict[int, ca.SX] = {}

@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.interrupts import interruptible
+from ocp.normal_form.normal_form import normal_form
 from ocp.referee.integrate_controls import integrate_controls
 from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
@@ -163,9 +164,11 @@ def costates_along(solution: Solution) -> Solution:
     """
     check_instance(solution, Solution, "costates_along: solution")
     if solution.normal is not None:
-        normal = costates_along(solution.normal)
-        nx = solution.problem.model.nx
-        return solution.with_(normal=normal, costate=normal.costate[:, :nx])
+        normal, form = costates_along(solution.normal), normal_form(solution.problem)
+        assert form is not None
+        values = normal.data.values
+        costate = form.costate(normal.x, normal.costate, normal.t, normal.fractions, values)
+        return solution.with_(normal=normal, costate=costate)
     truth = integrate_controls(solution)
     if not truth.has_adjoint:
         return solution

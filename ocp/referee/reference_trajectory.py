@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from ocp.problem.data_residuals import data_cost, data_fractions, data_residuals
 from ocp.problem.time_switches import time_switches
 from ocp.referee.control_integrators import Restarts, Steps, integrator_of
 from ocp.referee.implicit_integrator import integrate_implicitly
@@ -33,8 +34,8 @@ class ReferenceTrajectory:
         drive: what determines the control in each step, see ``Integrated``.
         p_start: parameters at the start of each step, (K, n_p).
         p_end: parameters at the end of each step, (K, n_p).
-        cost: running plus terminal cost.
-        cost_size: integral of abs(L) plus the magnitude of the terminal cost.
+        cost: running cost, terminal cost, and that of data.
+        cost_size: integral of abs(L) plus the magnitude of the other costs.
         cost_error: bound of the error of the cost, from integrations of other accuracy; inf where
             none was made.
         end_error: by how much the last refinement moved the final state, relative.
@@ -120,7 +121,8 @@ class Replayed:
             return solution.fractions
         values = solution.data.values
         t0, duration = float(solution.t[0]), solution.duration
-        knots = np.union1d(solution.fractions, values.knots)
+        instants = data_fractions(solution.problem)
+        knots = np.union1d(np.union1d(solution.fractions, values.knots), instants)
         knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
         switches = time_switches(solution.problem, t0, duration, values)
         # A step ends before a switch, and another begins behind it.
@@ -159,6 +161,13 @@ class Replayed:
             given = (solution, steps, substeps, start, restarts, tolerance)
             found = integrate_implicitly(*given)
         terminal = float(ocp.functions.terminal_cost(found.x[-1], t[-1], values.at(1.0)[0]))
+        if ocp.data:
+            before = np.vstack([found.x[:1], found.ends])
+
+            def states(fractions: np.ndarray) -> np.ndarray:
+                return before[np.abs(fine[:, None] - fractions).argmin(axis=0)]
+
+            terminal += data_cost(data_residuals(ocp, states, float(t[0]), values))
         return ReferenceTrajectory(
             t=t,
             x=found.x,

@@ -16,6 +16,7 @@ from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.normal_form.normal_form import normal_form
 from ocp.problem.constraint import Constraint
+from ocp.problem.data_residuals import data_residuals
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
@@ -228,6 +229,17 @@ class Solution:
             if c.soft is not None
         }
 
+    @property
+    def residuals(self) -> dict[str, np.ndarray]:
+        """(h - y) / sigma of every measurement by name, (K, m), by the solution's own states."""
+        values = self.data.values
+        model = self.problem.model
+
+        def states(fractions: np.ndarray) -> np.ndarray:
+            return self.state(self.t[0] + fractions * self.duration).reshape(-1, model.nx)
+
+        return data_residuals(self.problem, states, float(self.t[0]), values)
+
     def or_raise(self) -> "Solution":
         """Return self, or raise ``SolverError`` with the reason if the solve failed."""
         if not self.status.is_success:
@@ -333,7 +345,13 @@ class Solution:
         if self.normal is not None:
             m = self.problem.model
             x, costate = self.normal.state(t), self.normal.costate_at(t)
-            return np.concatenate([x[..., : m.nx], costate[..., : m.nx]], axis=-1)
+            form = normal_form(self.problem)
+            if form is None or form.data is None:
+                return np.concatenate([x[..., : m.nx], costate[..., : m.nx]], axis=-1)
+            points, values = np.atleast_1d(t), self.normal.data.values
+            fractions = (points - self.t[0]) / self.duration
+            own = form.costate(np.atleast_2d(x), np.atleast_2d(costate), points, fractions, values)
+            return np.concatenate([x[..., : m.nx], own.reshape(*t.shape, m.nx)], axis=-1)
         return self._cubics(np.clip(t, self.t[0], self.t[-1]))
 
     @cached_property

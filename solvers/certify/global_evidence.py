@@ -8,7 +8,6 @@ import numpy as np
 from ocp import (
     OCP,
     ProblemError,
-    Signal,
     Solution,
     UnsupportedProblem,
     discretise,
@@ -16,7 +15,7 @@ from ocp import (
     linear_quadratic,
     solve,
 )
-from ocp.internal import RunData
+from ocp.internal import RunData, cut
 from solvers.certify.certificate import CONVEXITY, STARTS, Check, Estimate, Verdict
 from solvers.collocation.collocation import Collocation
 from solvers.direct.multiple_shooting import MultipleShooting
@@ -106,7 +105,7 @@ def other_starts(
         return Check.skipped(STARTS, f"none of {starts} starts led to a feasible optimum")
     cheapest = found[0].cost
     if _lead(best, cheapest) > _CHEAPER:  # by what the coarse grid violates, perhaps
-        finer = replace(solver, intervals=_FINER * solver.intervals)
+        finer = replace(solver, intervals=cut(solver.intervals, _FINER))
         cheapest = evaluate(solve(ocp, finer, guess=found[0].solution)).cost
     lead = _lead(best, cheapest)
     costs = ", ".join(f"{optimum.cost:.6g} ({optimum.found}x)" for optimum in found[:4])
@@ -132,7 +131,7 @@ def every_extremal(best: Estimate) -> Check:
     ocp = best.solution.problem
     if not ocp.invariants:
         return Check.skipped(EXTREMALS, "the problem keeps no manifold to scan")
-    signals = [entry.name for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.name for entry in ocp.moving]
     if signals:
         return Check.skipped(EXTREMALS, f"signal '{signals[0]}' is not scanned")
     try:

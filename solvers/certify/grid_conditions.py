@@ -70,7 +70,9 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
         solution: of direct multiple shooting, controls held.
         integrator: of its intervals, default RK4.
     """
-    transcription = Transcription(solution.problem, len(solution.t) - 1, integrator or RK4())
+    ocp, nodes = solution.problem, solution.fractions
+    method = integrator or RK4()
+    transcription = Transcription(ocp, len(nodes) - 1, method, nodes=nodes)
     point = _point(transcription, solution)
     independence, curvature = _independence(point), _curvature(point)
     if independence.verdict is not Verdict.HOLDS:

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, FreeTime, Signal, Solution
+from ocp import OCP, FreeTime, Solution
 from ocp.internal import hamiltonian
 from solvers.certify.certificate import Check
 
@@ -45,7 +45,7 @@ def hamiltonian_check(solution: Solution, limit: float) -> Check:
 def _why_not(ocp: OCP) -> str:
     if ocp.model.is_discrete:
         return "in discrete time nothing is conserved"
-    signals = [entry.name for entry in ocp.parameters if isinstance(entry, Signal)]
+    signals = [entry.name for entry in ocp.moving]
     if signals:
         return f"signal '{signals[0]}' changes H in a way that H_t does not show"
     paths = [c.name for c in ocp.at("path") if ca.depends_on(c.expression, ocp.model.t)]

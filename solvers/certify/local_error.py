@@ -57,6 +57,8 @@ def roughness(answer: Solution) -> np.ndarray:
     over the length of the piece, relative to 1 + the largest coefficient. A switch in the very
     middle of a piece shows in the second alone: the control runs straight from bound to bound.
     """
+    if not answer.problem.model.nu:
+        return np.zeros(len(answer.breaks) - 1)
     pieces = answer.u.reshape(len(answer.breaks) - 1, -1, answer.problem.model.nu)
     lengths = np.diff(answer.t[answer.breaks])[:, None]
     rises = np.diff(pieces, axis=1)

@@ -37,7 +37,7 @@ class TimeScaledProblem:
 
     def __post_init__(self) -> None:
         """Refuse signals, which are sampled over the horizon."""
-        if any(isinstance(entry, Signal) for entry in self.start.problem.parameters):
+        if self.start.problem.moving:
             raise NoArcsError("signals are not looked at")
 
     @cached_property

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ocp import OCP, InitialGuess, Program, Solution, Status, UnsupportedProblem
+from ocp import OCP, Grid, InitialGuess, Program, Solution, Status, UnsupportedProblem
 from ocp.internal import (
     AlgebraicControls,
     Epigraph,
@@ -19,8 +19,8 @@ from ocp.internal import (
     WithSlacks,
     check_flag,
     check_instance,
+    check_intervals,
     check_positive,
-    check_whole,
     elevated,
     epigraph,
     least_violating,
@@ -62,7 +62,7 @@ class Collocation(ScalingSolver):
     Source: [Hager 2000; Benson et al. 2006; Garg et al. 2010]; backend [Waechter & Biegler 2006].
 
     Args:
-        intervals: number of intervals, equal but for the knots of signals.
+        intervals: number of intervals, equal but for the knots of signals; or a ``Grid``.
         degree: points an interval, d, 2 to 5.
         points: ``"radau"``: the end of each interval is a point, damps what is stiff; or
             ``"gauss"``: one order more, symmetric in time.
@@ -81,6 +81,7 @@ class Collocation(ScalingSolver):
     takes_phases: ClassVar[bool] = True
 
     intervals: int = 25
+    intervals: int | Grid = 25
     degree: int = 4
     points: Family = "radau"
     mesh: Mesh | None = None
@@ -96,7 +97,7 @@ class Collocation(ScalingSolver):
         super().__post_init__()
         CollocationPoints.of(self.points, self.degree)
         if self.mesh is None:
-            check_whole(self.intervals, "mesh: intervals")
+            check_intervals(self.intervals, "mesh: intervals")
         else:
             check_instance(self.mesh, Mesh, "collocation: mesh")
         check_positive(self.accuracy, "collocation: accuracy", finite=False)
@@ -107,7 +108,8 @@ class Collocation(ScalingSolver):
         """Return the mesh for a problem, given or as equal as the knots of its signals allow."""
         if self.mesh:
             return self.mesh
-        return Mesh(tuple(self.nodes(ocp, self.intervals)), (self.degree,) * self.intervals)
+        edges = self.nodes(ocp, self.intervals)
+        return Mesh(tuple(edges), (self.degree,) * (len(edges) - 1))
 
     @property
     def nlp_backend(self) -> NlpBackend:

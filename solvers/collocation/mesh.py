@@ -5,14 +5,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import ProblemError
-from ocp.internal import check_instance, check_real, check_whole
+from ocp import Grid, ProblemError
+from ocp.internal import check_instance, check_real
 from solvers.collocation.collocation_points import CollocationPoints, Family
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """Intervals of any lengths, each with a degree of its own.
+    """A ``Grid`` whose intervals have each a degree of its own.
 
     Args:
         edges: fractions of the horizon, from 0 to 1, (K + 1,).
@@ -29,10 +29,8 @@ class Mesh:
         """Check both, and keep them as tuples."""
         check_instance(self.edges, (tuple, list, np.ndarray), "mesh: edges")
         check_instance(self.degrees, (tuple, list, np.ndarray), "mesh: degrees")
-        edges = tuple(check_real(edge, "mesh: edge") for edge in self.edges)
+        edges = Grid(tuple(check_real(edge, "mesh: edge") for edge in self.edges)).fractions
         degrees = tuple(self.degrees)
-        if len(edges) < 2 or edges[0] != 0.0 or edges[-1] != 1.0 or not min(np.diff(edges)) > 0.0:
-            raise ProblemError("mesh: the edges must increase from 0 to 1")
         if len(degrees) != len(edges) - 1:
             raise ProblemError(f"mesh: {len(degrees)} degrees for {len(edges) - 1} intervals")
         for degree in degrees:
@@ -43,8 +41,7 @@ class Mesh:
     @classmethod
     def uniform(cls, intervals: int, degree: int) -> "Mesh":
         """Return equal intervals of one degree."""
-        check_whole(intervals, "mesh: intervals")
-        return cls(tuple(np.linspace(0.0, 1.0, intervals + 1)), (degree,) * intervals)
+        return cls(Grid.uniform(intervals).fractions, (degree,) * intervals)
 
     @property
     def intervals(self) -> int:

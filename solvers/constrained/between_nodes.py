@@ -15,6 +15,7 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Grid,
     InitialGuess,
     Program,
     Signal,
@@ -30,7 +31,9 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    cut,
     judged,
+    number_of,
     with_row_sizes,
 )
 from solvers.constrained.standard_form import StandardForm
@@ -74,6 +77,11 @@ class BetweenNodes(ScalingSolver):
         """Check the options."""
         super().__post_init__()
         check_instance(self.inner, MultipleShooting, "between nodes: inner")
+        if isinstance(self.inner.intervals, Grid) or self.inner.blocks:
+            raise UnsupportedProblem(
+                "between nodes: it halves equal intervals with a control each; its inner solver "
+                "takes no Grid and no blocks"
+            )
         check_whole(self.max_rounds, "between nodes: max_rounds")
         check_positive(self.tolerance, "between nodes: tolerance")
 
@@ -116,7 +124,7 @@ class BetweenNodes(ScalingSolver):
                 f"use {self.inner!r} itself"
             )
         rows = StandardForm.along(ocp)
-        tightened = _tightened(ocp, rows, self.inner.intervals)
+        tightened = _tightened(ocp, rows, number_of(self.inner.intervals))
         return BetweenNodesProgram(self, ocp, rows, self.inner.unjudged().prepare(tightened))
 
 
@@ -152,7 +160,7 @@ class BetweenNodesProgram(BuiltProgram):
             program = program._finer
             rounds = program._tighten(given, parameters, runs[-1])
             runs = [*runs, *rounds.runs]
-        intervals = program.solver.inner.intervals
+        intervals = number_of(program.solver.inner.intervals)
         status, message = rounds.judge(intervals)
         found = self._solution(runs, status, message, perf_counter() - started)
         return judged(found, self.solver.inner.success_accuracy, between_nodes=False)
@@ -164,7 +172,7 @@ class BetweenNodesProgram(BuiltProgram):
         guess: InitialGuess | None,
     ) -> "_Rounds":
         """Widen the margins on this grid until they suffice or do not help."""
-        tolerance, intervals = self.solver.tolerance, self.solver.inner.intervals
+        tolerance, intervals = self.solver.tolerance, number_of(self.solver.inner.intervals)
         nodes = np.linspace(0.0, 1.0, intervals + 1)
         margin, runs = np.zeros((len(nodes), self.rows.size)), []
         while True:
@@ -188,7 +196,7 @@ class BetweenNodesProgram(BuiltProgram):
     @cached_property
     def _finer(self) -> "BetweenNodesProgram":
         """The same with half the intervals' length, built at the first use."""
-        inner = replace(self.solver.inner, intervals=2 * self.solver.inner.intervals)
+        inner = replace(self.solver.inner, intervals=cut(self.solver.inner.intervals, 2))
         return replace(self.solver, inner=inner).prepare(self.ocp)
 
     def _solution(

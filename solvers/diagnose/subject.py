@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Program, Solution
-from ocp.internal import RunData, scaled
+from ocp.internal import RunData, number_of, scaled
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
 # Random points around the guess, for what must hold everywhere.
@@ -69,11 +69,13 @@ class DiagnosedProblem:
     @cached_property
     def coarse(self) -> "DiagnosedProblem":
         """The same on fewer intervals with more steps in each, where many solves are needed."""
-        if self.ocp.steps or self.solver.intervals <= _COARSE:
+        count = number_of(self.solver.intervals)
+        if self.ocp.steps or count <= _COARSE:
             return self
-        steps = -(-self.solver.intervals * self.solver.integrator.steps // _COARSE)
+        steps = -(-count * self.solver.integrator.steps // _COARSE)
         finer = replace(self.solver.integrator, steps=steps)
-        return replace(self, solver=replace(self.solver, intervals=_COARSE, integrator=finer))
+        coarse = replace(self.solver, intervals=_COARSE, integrator=finer, blocks=())
+        return replace(self, solver=coarse)
 
     @cached_property
     def guess(self) -> tuple[np.ndarray, np.ndarray]:

@@ -6,18 +6,18 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Program
+from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Program
 from ocp.internal import (
+    BlockingSolver,
     Epigraph,
     MethodProgram,
     RunData,
     RunResult,
-    ScalingSolver,
     Transcription,
     check_flag,
     check_instance,
+    check_intervals,
     check_positive,
-    check_whole,
     epigraph,
     least_violating,
 )
@@ -30,7 +30,7 @@ from solvers.direct.weak_method import weak_method
 
 
 @dataclass(frozen=True)
-class MultipleShooting(ScalingSolver):
+class MultipleShooting(BlockingSolver):
     """The direct baseline, for every kind of problem that can be described.
 
     Without states in the guess it starts from the roll-out of the controls, or from the start held
@@ -42,7 +42,7 @@ class MultipleShooting(ScalingSolver):
     Args:
         intervals: number of intervals, with one held control each, equal but for the knots of
             signals, which are nodes where there are intervals enough; a discrete-time problem
-            brings its own number.
+            brings its own number. Or a ``Grid`` of unequal ones.
         integrator: one-step method in each interval.
         backend: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
         tolerance: of the optimality conditions.
@@ -61,11 +61,14 @@ class MultipleShooting(ScalingSolver):
             constraints least: it tells whether the problem is infeasible, and is a better first
             iterate if it is not; after that, try other first iterates. Each may cost 300
             iterations; turn it off in a controller with a deadline.
+        blocks: over how many intervals each control is held; the last one goes on to the end, so
+            that ``(1, 1, 2)`` leaves three moves (a control horizon); none: each over one.
     """
 
     takes_phases: ClassVar[bool] = True
 
     intervals: int = 75
+    intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=RK4)
     backend: Literal["ipopt", "fatrop"] = "ipopt"
     tolerance: float = 1e-9
@@ -79,7 +82,7 @@ class MultipleShooting(ScalingSolver):
     def __post_init__(self) -> None:
         """Check the options."""
         super().__post_init__()
-        check_whole(self.intervals, "multiple shooting: intervals")
+        check_intervals(self.intervals, "multiple shooting: intervals")
         check_instance(self.integrator, Integrator, "multiple shooting: integrator")
         check_positive(self.accuracy, "multiple shooting: accuracy", finite=False)
         check_flag(self.compiled, "multiple shooting: compiled")
@@ -120,13 +123,15 @@ class MultipleShooting(ScalingSolver):
 
     def least_violating(self, ocp: OCP) -> Program | None:
         """Build the problem with a slack for its hard rows; see ``Solver``."""
-        return least_violating(self.unjudged(), ocp)
+        return least_violating(self.blocking(ocp).unjudged(), ocp)
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
-        nodes = self.nodes(ocp, ocp.steps or self.intervals)
+        nodes = self.nodes(ocp, self.intervals)
+        n = len(nodes) - 1
+        blocks = self.blocks_on(ocp, n)
         transcription = Transcription(
-            ocp, self.intervals, self.integrator, self.compiled, nodes=nodes
+            ocp, n, self.integrator, self.compiled, nodes=nodes, blocks=blocks
         )
         grid = ShootingGrid.of(ocp, nodes, self.integrator, fast=self.compiled)
         nlp = self.nlp_backend.build(transcription)
@@ -195,7 +200,8 @@ class MultipleShootingProgram(MethodProgram):
         self, data: RunData, guess: InitialGuess | None, duration: float, source: FirstStates
     ) -> tuple[np.ndarray, np.ndarray]:
         x, u = self.grid.first_iterate(data, guess, duration, source)
-        length = duration / self.transcription.time_unit
+        blocks, length = self.transcription.blocks, duration / self.transcription.time_unit
+        u = u if blocks is None else blocks.held(u)
         return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
 
     # -- the result ---------------------------------------------------------------------------
@@ -211,6 +217,7 @@ class MultipleShootingProgram(MethodProgram):
         """The last result, with the work of all runs."""
         result = outcome.last
         z, u = tr.split(result.w)
+        u = u if tr.blocks is None else tr.blocks.held(u)  # without the rounding of its equations
         return RunResult(
             status=outcome.status,
             message=outcome.message,

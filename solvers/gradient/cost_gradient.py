@@ -8,11 +8,11 @@ import numpy as np
 from ocp import OCP, Integrator, UnsupportedProblem
 from ocp.internal import (
     BufferedFunction,
+    ControlBlocks,
     RunData,
     Stage,
     compiled,
     hamiltonian,
-    node_fractions,
     node_widths,
     time_unit,
 )
@@ -45,39 +45,46 @@ class AdjointSweeps:
 
     Attributes:
         ocp: the problem.
-        n: number of intervals N.
+        nodes: as fractions of the horizon, (N + 1,).
         exact: whether ``backwards`` is the adjoint of ``forwards``, or integrates (3.62).
         forwards: (x0, u, t, h, p0, p1) -> x after each interval and its cost.
         backwards: (costate at the end, x, [x after,] u, t, h, p0, p1), the last interval first
             -> costate before each interval and dJ/du.
         final_cost: phi of (x, t, p).
         final_gradient: phi_x of (x, t, p).
+        blocks: controls that are held over several intervals.
     """
 
     ocp: OCP
-    n: int
+    nodes: np.ndarray
     exact: bool
     forwards: BufferedFunction
     backwards: BufferedFunction
     final_cost: BufferedFunction
     final_gradient: BufferedFunction
+    blocks: ControlBlocks | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of intervals N."""
+        return len(self.nodes) - 1
 
     @classmethod
     def of(
-        cls, ocp: OCP, intervals: int, integrator: Integrator, *, exact: bool, fast: bool
+        cls, ocp: OCP, nodes: np.ndarray, integrator: Integrator, *, exact: bool, fast: bool
     ) -> "AdjointSweeps":
         """Do all symbolic work; ``fast``: with the stages as machine code."""
         if ocp.model.is_discrete and not exact:
             raise UnsupportedProblem(
                 f"{ocp.name}: the model is discrete in time; use gradient='discrete'"
             )
-        n, stage = ocp.steps or intervals, Stage.of(ocp, integrator, held=True)
+        n, stage = len(nodes) - 1, Stage.of(ocp, integrator, held=True)
         step, back = stage.step, stage.adjoint if exact else _costate_step(ocp, integrator)
         if fast:
             step, back = compiled(step), compiled(back)
         ends = ocp.functions.terminal_cost, ocp.functions.terminal_gradient
         return cls(
-            ocp, n, exact, *map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n), *ends))
+            ocp, nodes, exact, *map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n), *ends))
         )
 
 
@@ -98,7 +105,7 @@ class Objective:
         """Lay out the intervals."""
         ocp, n = sweeps.ocp, sweeps.n
         self.sweeps, self.data, self.box = sweeps, data, ocp.control_bounds
-        self.nodes = node_fractions(ocp, n)
+        self.nodes = sweeps.nodes
         self.h = np.ones(n) if ocp.model.is_discrete else ocp.duration * node_widths(self.nodes)
         self.weight = self.h[:, None] / time_unit(ocp)
         left, right = data.values.on(self.nodes)
@@ -109,7 +116,8 @@ class Objective:
 
     def rolled_out(self, u: np.ndarray) -> LineSearchTrial:
         """Integrate (3.61) forwards along controls (N, nu), clipped to their bounds."""
-        u, x0 = self.box.clip(u), self.data.x0
+        u, x0, blocks = self.box.clip(u), self.data.x0, self.sweeps.blocks
+        u = u if blocks is None else blocks.held(u)
         x, costs = self.sweeps.forwards(x0, u.T, *self._schedule)
         self.rollouts += 1
         x = np.vstack([x0, x.T])
@@ -129,7 +137,10 @@ class Objective:
         costate = np.vstack([costate.T[::-1], final])
         if not (np.isfinite(costate).all() and np.isfinite(gradient).all()):
             return self._at_rest(trial.u)
-        return ControlIterate(trial, costate, gradient.T[::-1] / self.weight)
+        gradient = gradient.T[::-1] / self.weight
+        if self.sweeps.blocks is not None:
+            gradient = self.sweeps.blocks.mean(gradient, self.h)
+        return ControlIterate(trial, costate, gradient)
 
     def _at_rest(self, u: np.ndarray) -> ControlIterate:
         """What there is to show of controls along which something blows up."""

@@ -9,6 +9,7 @@ from ocp import (
     OCP,
     RK4,
     Euler,
+    Grid,
     InitialGuess,
     Integrator,
     Program,
@@ -17,15 +18,17 @@ from ocp import (
     Work,
 )
 from ocp.internal import (
+    BlockingSolver,
     MethodProgram,
     RunData,
     RunResult,
-    ScalingSolver,
     check_choice,
     check_flag,
     check_instance,
+    check_intervals,
     check_not_negative,
     check_whole,
+    node_fractions,
     refuse_free_ends,
     refuse_state_bounds,
 )
@@ -35,7 +38,7 @@ from solvers.gradient.line_search import AcceptedStep, Armijo, FixedStep, StepRu
 
 
 @dataclass(frozen=True)
-class Schuetz(ScalingSolver):
+class Schuetz(BlockingSolver):
     """Minimise over the control trajectory by (conjugate) gradients of the Hamiltonian.
 
     The defaults are Algorithm 2 as the thesis has it: Euler steps, a fixed step, Fletcher-
@@ -45,7 +48,7 @@ class Schuetz(ScalingSolver):
     Source: thesis 3.2.5, [Schuetz et al. 2014], [Lasdon, Mitter & Waren 1967].
 
     Args:
-        intervals: held controls; a discrete-time problem brings its own number.
+        intervals: held controls; a discrete-time problem brings its own number. Or a ``Grid``.
         integrator: one-step method in each interval.
         step: ``FixedStep(alpha)`` or ``Armijo()``.
         direction: ``"steepest"`` (3.65), ``"fletcher-reeves"`` (Algorithm 2) or
@@ -57,9 +60,10 @@ class Schuetz(ScalingSolver):
         stop_on_rise: third test.
         stationarity: converged when the largest projected gradient falls below this.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
+        blocks: see ``MultipleShooting``.
     """
 
-    intervals: int = 75
+    intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=Euler)
     step: StepRule = field(default_factory=FixedStep)
     direction: DirectionRule = "fletcher-reeves"
@@ -73,7 +77,7 @@ class Schuetz(ScalingSolver):
     def __post_init__(self) -> None:
         """Check the options."""
         super().__post_init__()
-        check_whole(self.intervals, "Schuetz: intervals")
+        check_intervals(self.intervals, "Schuetz: intervals")
         check_whole(self.max_iterations, "Schuetz: max_iterations")
         check_instance(self.integrator, Integrator, "Schuetz: integrator")
         check_instance(self.step, (FixedStep, Armijo), "Schuetz: step")
@@ -85,7 +89,7 @@ class Schuetz(ScalingSolver):
         check_flag(self.compiled, "Schuetz: compiled")
 
     @classmethod
-    def sound(cls, *, intervals: int = 75, max_iterations: int = 500) -> "Schuetz":
+    def sound(cls, *, intervals: int | Grid = 75, max_iterations: int = 500) -> "Schuetz":
         """Return the version that converges: line search, restarts, exact gradient, RK4."""
         return cls(
             intervals=intervals,
@@ -111,9 +115,9 @@ class Schuetz(ScalingSolver):
         check_instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
         exact = self.gradient == "discrete"
-        sweeps = AdjointSweeps.of(
-            ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled
-        )
+        nodes = node_fractions(ocp, self.intervals)
+        sweeps = AdjointSweeps.of(ocp, nodes, self.integrator, exact=exact, fast=self.compiled)
+        sweeps = replace(sweeps, blocks=self.blocks_on(ocp, sweeps.n))
         return SchuetzProgram(self, ocp, sweeps)
 
 

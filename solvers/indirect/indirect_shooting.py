@@ -5,7 +5,17 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Solution, UnsupportedProblem, Work
+from ocp import (
+    OCP,
+    RK4,
+    Grid,
+    InitialGuess,
+    Integrator,
+    ProblemError,
+    Solution,
+    UnsupportedProblem,
+    Work,
+)
 from ocp.internal import (
     MethodProgram,
     RunData,
@@ -14,8 +24,10 @@ from ocp.internal import (
     check_choice,
     check_flag,
     check_instance,
+    check_intervals,
     check_positive,
     check_whole,
+    number_of,
     refuse_state_bounds,
 )
 from solvers.indirect.boundary_value_problem import ExtremalProblem
@@ -40,7 +52,8 @@ class IndirectShooting(ScalingSolver):
 
     Args:
         segments: number of segments.
-        steps: integration steps over the whole horizon; rounded up to fill the segments.
+        steps: integration steps over the whole horizon; rounded up to fill the segments. Or a
+            ``Grid`` of them, which the segments share out equally by number.
         integrator: one-step method of each step.
         jacobian: ``"exact"``, by CasADi along the trajectory, or ``"finite-difference"``,
             the thesis' Algorithm 1, for comparison.
@@ -55,7 +68,7 @@ class IndirectShooting(ScalingSolver):
     takes_phases: ClassVar[bool] = True
 
     segments: int = 1
-    steps: int = 300
+    steps: int | Grid = 300
     integrator: Integrator = field(default_factory=RK4)
     jacobian: Literal["exact", "finite-difference"] = "exact"
     delta: float = 1e-6
@@ -69,7 +82,12 @@ class IndirectShooting(ScalingSolver):
         """Check the options."""
         super().__post_init__()
         check_whole(self.segments, "indirect shooting: segments")
-        check_whole(self.steps, "indirect shooting: steps", least=self.segments)
+        check_intervals(self.steps, "indirect shooting: steps", least=self.segments)
+        if isinstance(self.steps, Grid) and self.steps.intervals % self.segments:
+            raise ProblemError(
+                f"indirect shooting: the {self.steps.intervals} steps of the grid are no multiple "
+                f"of the {self.segments} segments"
+            )
         check_instance(self.integrator, Integrator, "indirect shooting: integrator")
         check_whole(self.max_steps, "indirect shooting: max_steps")
         check_positive(self.tolerance, "indirect shooting: tolerance")
@@ -95,7 +113,7 @@ class IndirectShooting(ScalingSolver):
         refuse_state_bounds(ocp, "indirect shooting")
         if self.continuation:
             self.continuation.check(ocp)
-        per_segment = -(-self.steps // self.segments)
+        per_segment = -(-number_of(self.steps) // self.segments)
         extremals = ExtremalProblem.of(
             ocp, self.segments, per_segment, self.integrator, fast=self.compiled
         )
@@ -127,8 +145,10 @@ class IndirectShootingProgram(MethodProgram):
 
     def schedule(self, data: RunData, share: float = 1.0) -> ShootingSchedule:
         """Return the integration grid of a run."""
-        ext = self.extremals
-        return ShootingSchedule.of(ext.ocp, data, ext.shape.segments * ext.steps, share)
+        ext, steps = self.extremals, self.solver.steps
+        if not isinstance(steps, Grid):
+            steps = ext.shape.segments * ext.steps
+        return ShootingSchedule.of(ext.ocp, data, steps, share)
 
     # -- Newton ------------------------------------------------------------------------
 

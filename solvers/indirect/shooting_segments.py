@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ocp import OCP
+from ocp import OCP, Grid
 from ocp.internal import RunData, node_fractions
 
 
@@ -32,10 +32,14 @@ class ShootingSchedule:
     p_last: np.ndarray
 
     @classmethod
-    def of(cls, ocp: OCP, data: RunData, steps: int, share: float = 1.0) -> "ShootingSchedule":
+    def of(
+        cls, ocp: OCP, data: RunData, steps: int | Grid, share: float = 1.0
+    ) -> "ShootingSchedule":
         """Return the schedule of the first ``share`` of the horizon."""
-        whole = share == 1.0
-        fractions = node_fractions(ocp, steps) if whole else np.linspace(0.0, 1.0, steps + 1)
+        if share == 1.0 or isinstance(steps, Grid):
+            fractions = node_fractions(ocp, steps)
+        else:
+            fractions = np.linspace(0.0, 1.0, steps + 1)
         left, right = data.values.on(share * fractions)
         return cls(
             t0=data.t0,

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ocp import Solution, Status, Work
+from ocp import Grid, Solution, Status, Work
+from ocp.internal import number_of
 from solvers.indirect.indirect_shooting import IndirectShootingProgram
 
 _MOST_STEPS = 2**16
@@ -27,8 +28,8 @@ class HalvingChange:
 
 def finer(program: IndirectShootingProgram) -> IndirectShootingProgram:
     """Return the program with half the step."""
-    extremals = program.extremals.finer()
-    steps = extremals.shape.segments * extremals.steps
+    extremals, steps = program.extremals.finer(), program.solver.steps
+    steps = steps.cut(2) if isinstance(steps, Grid) else extremals.shape.segments * extremals.steps
     return IndirectShootingProgram(replace(program.solver, steps=steps), program.ocp, extremals)
 
 
@@ -84,13 +85,14 @@ def halved_until_still(
         relative = moved.cost / (1.0 + abs(result.cost))
         if relative <= accuracy and moved.state <= _STATE * accuracy:
             break
-        said = f"half of its {program.solver.steps} steps would change the cost by {moved.cost:.1e}"
+        count, finer_count = (number_of(each.solver.steps) for each in (program, half))
+        said = f"half of its {count} steps would change the cost by {moved.cost:.1e}"
         said = f"{said}, a state by {moved.state:.1e}"
-        if half.solver.steps > _MOST_STEPS:
+        if finer_count > _MOST_STEPS:
             return result.with_(status=Status.INACCURATE, message=said), program
         again = joined(result, run_from(half, result))
         if not again.status.is_success:
-            said = f"{said}; with {half.solver.steps}: {again.status.name}, {again.message}"
+            said = f"{said}; with {finer_count}: {again.status.name}, {again.message}"
             return result.with_(status=Status.INACCURATE, message=said), program
         result, program = again, half
     return result, program

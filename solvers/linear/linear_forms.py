@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from ocp.internal import ConstraintRow, LinearQuadratic, LQData, Matrices
+from ocp.internal import ConstraintRow, ControlBlocks, LinearQuadratic, LQData, Matrices
 from solvers.linear import regulator_gains as recursion
 from solvers.linear.qp.quadratic_program import QpVectors
 from solvers.linear.stacked_prediction import StackedPrediction
@@ -45,13 +45,18 @@ class MPCForm(ABC):
     Attributes:
         lq: the problem.
         equations: number of rows before them.
+        blocks: controls that are held over several steps, by equations that come next.
         H: for the matrices last given.
         G: for the matrices last given.
     """
 
-    def __init__(self, lq: LinearQuadratic, equations: int) -> None:
+    def __init__(self, lq: LinearQuadratic, defects: int, blocks: ControlBlocks | None) -> None:
         """Name the rows."""
-        self.lq, self.equations = lq, equations
+        self.lq, self.blocks = lq, blocks
+        # The steps that go on with the control of the one before, and which controls do.
+        self._later = np.flatnonzero(blocks.follows) if blocks else np.empty(0, dtype=int)
+        self._held = slice(0, blocks.controls if blocks else 0)
+        self.equations = defects + self._later.size * self._held.stop
         self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
         on_control = [row for row, on in zip(lq.rows, lq.on_control, strict=True) if on]
         first = [FormPosition.of(row, 0) for row in on_control]
@@ -111,10 +116,10 @@ class MPCForm(ABC):
 class Sparse(MPCForm):
     """Unknowns (u_0, x_1, u_1, ..., x_N): effort linear in the number of steps."""
 
-    def __init__(self, lq: LinearQuadratic) -> None:
+    def __init__(self, lq: LinearQuadratic, blocks: ControlBlocks | None = None) -> None:
         """Lay out rows and columns once."""
         n, m, steps = lq.ocp.model.nx, lq.ocp.model.nu, lq.steps
-        super().__init__(lq, steps * n)
+        super().__init__(lq, steps * n, blocks)
         start = np.arange(steps)[:, None] * (n + m)
         self._u = start + np.arange(m)
         self._after = start + m + np.arange(n)
@@ -147,10 +152,15 @@ class Sparse(MPCForm):
         steps, n = self._after.shape
         on, count = self.lq.on_control, len(self.lq.rows)
         defects = np.arange(steps * n).reshape(steps, n)
-        first = steps * n + np.arange(int(on.sum()))[None]
-        middle = first.size + steps * n + np.arange((steps - 1) * count).reshape(steps - 1, count)
-        end = steps * n + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
+        held = np.arange(steps * n, self.equations).reshape(-1, max(1, self._held.stop))
+        first = self.equations + np.arange(int(on.sum()))[None]
+        middle = self.equations + first.size + np.arange((steps - 1) * count)
+        middle = middle.reshape(steps - 1, count)
+        end = self.equations + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
+        same = np.repeat(np.eye(self._held.stop)[None], len(held), axis=0)
         return [
+            _Block(held, self._u[self._later, self._held], same),
+            _Block(held, self._u[self._later - 1, self._held], -same),
             _Block(defects, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
             _Block(defects[1:], self._after[:-1], -m.A[1:]),
             _Block(defects, self._u, -m.B),
@@ -174,7 +184,7 @@ class Sparse(MPCForm):
         known = m.D_x[0, on] @ x0
         low[:first] -= known
         high[:first] -= known
-        rows = defects.ravel()
+        rows = np.append(defects.ravel(), np.zeros(self.equations - defects.size))
         return QpVectors(g, np.concatenate([rows, low]), np.concatenate([rows, high]))
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
@@ -192,7 +202,7 @@ class Sparse(MPCForm):
     ) -> np.ndarray:
         """Return minus the multipliers of x_{k+1} - A x_k - B u_k = c_k, and what follows at 0."""
         m = data.matrices
-        later = -y[: self.equations].reshape(self._after.shape)
+        later = -y[: self._after.size].reshape(self._after.shape)
         first = 2.0 * half[0, : len(x_end)] + later[0] @ m.A[0] + self.split(y)[0][0] @ m.D_x[0]
         return np.vstack([first, later])
 
@@ -200,9 +210,9 @@ class Sparse(MPCForm):
 class Condensed(MPCForm):
     """Unknowns V of u = -Kx + v (2.83 to 2.91): few and dense, for short horizons."""
 
-    def __init__(self, lq: LinearQuadratic) -> None:
+    def __init__(self, lq: LinearQuadratic, blocks: ControlBlocks | None = None) -> None:
         """Wait for the matrices."""
-        super().__init__(lq, 0)
+        super().__init__(lq, 0, blocks)
         self._prediction: StackedPrediction | None = None
 
     def set_matrices(self, matrices: Matrices) -> None:
@@ -211,7 +221,9 @@ class Condensed(MPCForm):
         self._prediction = p = StackedPrediction.of(matrices, feedback)
         on, stage = self.lq.on_control, matrices.D @ p.stages
         width = p.end.shape[1]
-        rows = [stage[0, on], stage[1:].reshape(-1, width), matrices.D_f @ p.end]
+        held = self._changes(p.stages[:, matrices.A.shape[1] :])
+        rows = [held.reshape(-1, width), stage[0, on]]
+        rows += [stage[1:].reshape(-1, width), matrices.D_f @ p.end]
         self.H, self.G = sp.csc_matrix(p.hessian), sp.csc_matrix(np.vstack(rows))
 
     @property
@@ -226,7 +238,9 @@ class Condensed(MPCForm):
         rows = (m.D @ z[:, :, None])[:, :, 0]
         known = np.concatenate([rows[0, on], rows[1:].ravel(), m.D_f @ x_end])
         low, high = self._bounds(data)
-        return QpVectors(self._stacked.gradient(data, z, x_end), low - known, high - known)
+        held = -self._changes(z[:, len(x0) :]).ravel()
+        low, high = (np.append(held, bound - known) for bound in (low, high))
+        return QpVectors(self._stacked.gradient(data, z, x_end), low, high)
 
     def trajectory(self, z: np.ndarray, data: LQData, x0: np.ndarray) -> Trajectory:
         """Return states and controls."""
@@ -242,8 +256,15 @@ class Condensed(MPCForm):
         """Return the adjoint of cost and constraints."""
         m, (stage, end) = data.matrices, self.split(y)
         slope, n = 2.0 * half + (stage[:, None] @ m.D)[:, 0], len(x_end)
+        by_u, held = slope[:, n:], y[: self.equations].reshape(self._later.size, self._held.stop)
+        by_u[self._later, self._held] += held
+        by_u[self._later - 1, self._held] -= held
         final = 2.0 * (m.P @ x_end + data.p) + end @ m.D_f
-        return self._stacked.costates(slope[:, :n], slope[:, n:], final)
+        return self._stacked.costates(slope[:, :n], by_u, final)
+
+    def _changes(self, u: np.ndarray) -> np.ndarray:
+        """Return by how much the controls (N, nu, ...) change where they are held."""
+        return u[self._later, self._held] - u[self._later - 1, self._held]
 
 
 class _Block(NamedTuple):

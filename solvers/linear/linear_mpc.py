@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from ocp import OCP, InitialGuess, Program, Status, UnsupportedProblem, Work, linear_quadratic
 from ocp.internal import (
+    BlockingSolver,
     ImposedRows,
     LinearQuadratic,
     LQData,
@@ -16,7 +17,6 @@ from ocp.internal import (
     RunData,
     RunResult,
     ScaledOCP,
-    ScalingSolver,
     check_choice,
     check_flag,
     check_positive,
@@ -37,7 +37,7 @@ _SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
-class LinearMPC(ScalingSolver):
+class LinearMPC(BlockingSolver):
     r"""A convex linear-quadratic problem with linear constraints, as a quadratic program.
 
     .. math:: \min_z \; \frac12 z'Hz + g'z \quad \text{s.t.} \quad l \le Gz \le u
@@ -64,6 +64,7 @@ class LinearMPC(ScalingSolver):
             that does not limit the input (``Constraint(limits_input=...)``) by e, all in the units
             in which the problem is written; it has to exceed the constraints' multipliers. None:
             hard.
+        blocks: see ``MultipleShooting``.
 
     Attributes:
         soft_in_sizes: whether w is a price in the sizes in which the problem is solved instead,
@@ -99,7 +100,7 @@ class LinearMPC(ScalingSolver):
     def prepare(self, ocp: OCP) -> "LinearMPCProgram":
         """Read the matrices, lay the program out."""
         lq = linear_quadratic(ocp)
-        form = _FORMS[self.form](lq)
+        form = _FORMS[self.form](lq, self.blocks_on(ocp, lq.steps))
         backend = qp_backend(self.backend, self.tolerance)
         program = LinearMPCProgram(self, ocp, lq, form, backend, self._softening(ocp, form))
         program.prepare(lq.sample_matrices(lq.declared) if lq.fixed is None else lq.fixed)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Integrator, Signal
+from ocp import OCP, Integrator
 from ocp.internal import ConstraintRows, Stage
 from solvers.tabular.columns import Columns
 
@@ -62,7 +62,7 @@ class GridFunctions:
 
 def _signals(ocp: OCP) -> list[int]:
     """Which parameters may change along the horizon."""
-    moving = [isinstance(e, Signal) for e in ocp.parameters for _ in range(e.symbol.numel())]
+    moving = [e in ocp.moving for e in ocp.parameters for _ in range(e.symbol.numel())]
     return np.flatnonzero(moving).tolist()
 
 

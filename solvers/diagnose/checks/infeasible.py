@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ocp import OCP, FreeTime, Signal, Solution, evaluate, solve
+from ocp import OCP, FreeTime, Solution, evaluate, solve
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.elastic_program import Demand, ElasticProgram, ElasticSolution
 from solvers.diagnose.finding import Finding, Severity
@@ -64,8 +64,7 @@ def _time_may_help(
     A signal is given over the horizon as it is.
     """
     ends = {c.name for c in subject.ocp.at("terminal")}
-    signals = any(isinstance(entry, Signal) for entry in subject.ocp.parameters)
-    return not signals and any(ends & set(elastic.demands[i].where) for i in members)
+    return not subject.ocp.moving and any(ends & set(elastic.demands[i].where) for i in members)
 
 
 def _shortest(subject: DiagnosedProblem) -> float | None:

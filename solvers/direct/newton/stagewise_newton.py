@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ocp import OCP, RK4, InitialGuess, Integrator, Status, UnsupportedProblem, Work
+from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Status, UnsupportedProblem, Work
 from ocp.internal import (
     MethodProgram,
     RunData,
@@ -12,6 +12,7 @@ from ocp.internal import (
     ScalingSolver,
     check_flag,
     check_instance,
+    check_intervals,
     check_positive,
     check_whole,
     refuse_free_ends,
@@ -48,7 +49,7 @@ class StagewiseNewton(ScalingSolver):
 
     Args:
         intervals: number of intervals, with one held control each; a discrete-time problem
-            brings its own number.
+            brings its own number. Or a ``Grid`` of unequal ones.
         integrator: one-step method in each interval.
         tolerance: of the residual: norm of all defects, or of the Lagrangian's gradient relative
             to 1 + the largest costate; the gradient in a control is measured per width of its
@@ -60,7 +61,7 @@ class StagewiseNewton(ScalingSolver):
             ``compiled``.
     """
 
-    intervals: int = 75
+    intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=RK4)
     tolerance: float = 1e-9
     max_iterations: int = 300
@@ -70,7 +71,7 @@ class StagewiseNewton(ScalingSolver):
     def __post_init__(self) -> None:
         """Check the options."""
         super().__post_init__()
-        check_whole(self.intervals, "stagewise Newton: intervals")
+        check_intervals(self.intervals, "stagewise Newton: intervals")
         check_whole(self.max_iterations, "stagewise Newton: max_iterations")
         check_instance(self.integrator, Integrator, "stagewise Newton: integrator")
         check_positive(self.tolerance, "stagewise Newton: tolerance")
@@ -90,9 +91,9 @@ class StagewiseNewton(ScalingSolver):
         """Build stages and recursion."""
         check_instance(ocp, OCP, "stagewise Newton: the problem")
         _refuse(ocp)
-        n, fast = ocp.steps or self.intervals, self.compiled
-        step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
-        grid = ShootingGrid.of(ocp, self.nodes(ocp, n), self.integrator, fast=fast)
+        nodes, fast = self.nodes(ocp, self.intervals), self.compiled
+        step = NewtonStep.of(ocp, len(nodes) - 1, self.integrator, fast=fast)
+        grid = ShootingGrid.of(ocp, nodes, self.integrator, fast=fast)
         return StagewiseNewtonProgram(self, ocp, step, grid)
 
 

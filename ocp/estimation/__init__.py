@@ -1,0 +1,1 @@
+"""What data tell of constants and starts: residuals, covariance, standard errors."""

@@ -1,0 +1,69 @@
+"""Checks of a problem's measurements against its states and its horizon."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import casadi as ca
+import numpy as np
+
+from ocp.checks.errors import ProblemError
+from ocp.checks.expressions import refuse_foreign_symbols
+from ocp.problem.measurement import Measurement
+from ocp.problem.model import Model
+from ocp.problem.parameters import Entry, Parameter, Unknown
+
+# An instant is the end of the horizon, or a step, if it is nearer than this, relative to either.
+_ROUNDING = 1e-9
+
+
+class _Problem(Protocol):
+    """What of an ``OCP`` is looked at: its own file is built on this one."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def data(self) -> tuple[Measurement, ...]: ...
+
+    @property
+    def duration(self) -> float: ...
+
+    @property
+    def has_free_time(self) -> bool: ...
+
+
+def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
+    """Refuse measurements of what has no value at an instant, or outside the horizon."""
+    if not ocp.data:
+        return
+    _check_names(ocp.name, [m.name for m in ocp.data])
+    constants = [e.symbol for e in entries if isinstance(e, Parameter | Unknown)]
+    if ocp.has_free_time:
+        raise ProblemError(
+            f"{ocp.name}: measurement '{ocp.data[0].name}': its instants are seconds, and "
+            "the final time is free: give a horizon, or scale time by an unknown constant"
+        )
+    for m in ocp.data:
+        what = f"{ocp.name}: measurement '{m.name}'"
+        refuse_foreign_symbols(m.expression, [ocp.model.x, ocp.model.t, *constants], what)
+        if not ca.depends_on(m.expression, ocp.model.x):
+            raise ProblemError(f"{what}: it contains no state")
+        times = np.asarray(m.times)
+        outside = (times < 0.0) | (times > ocp.duration * (1.0 + _ROUNDING))
+        if outside.any():
+            raise ProblemError(
+                f"{what}: t = {times[outside.argmax()]:g} s is not within the horizon of "
+                f"{ocp.duration:g} s"
+            )
+        step = ocp.model.dt
+        if step is not None and (np.abs(times / step - np.round(times / step)) > 1e-6).any():
+            raise ProblemError(f"{what}: its instants are no multiples of the step of {step:g} s")
+
+
+def _check_names(owner: str, names: Sequence[str]) -> None:
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ProblemError(f"{owner}: two measurements are called '{twice[0]}'")
