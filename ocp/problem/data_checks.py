@@ -48,8 +48,10 @@ def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
         )
     for m in ocp.data:
         what = f"{ocp.name}: measurement '{m.name}'"
-        refuse_foreign_symbols(m.expression, [ocp.model.x, ocp.model.t, *constants], what)
-        if not ca.depends_on(m.expression, ocp.model.x):
+        refuse_foreign_symbols(
+            m.expression, [ocp.model.x, ocp.model.z, ocp.model.t, *constants], what
+        )
+        if not ca.depends_on(m.expression, ca.vertcat(ocp.model.x, ocp.model.z)):
             raise ProblemError(f"{what}: it contains no state")
         times = np.asarray(m.times)
         outside = (times < 0.0) | (times > ocp.duration * (1.0 + _ROUNDING))
