@@ -27,6 +27,7 @@ from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.peak import Peak
 from ocp.problem.rate import Rate
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work
@@ -59,6 +60,7 @@ __all__ = [
     "Model",
     "OCPError",
     "Parameter",
+    "Peak",
     "Plant",
     "PlantInput",
     "Polyhedron",

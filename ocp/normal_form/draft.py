@@ -147,6 +147,7 @@ class Draft:
             start_bounds=start,
             unknowns=(),
             rates=(),
+            peaks=(),
             last_input=None,
             smoothness=self.smoothness,
             guess=None,

@@ -9,6 +9,7 @@ import numpy as np
 from ocp.normal_form.draft import Draft
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
+from ocp.normal_form.peaks import add_peaks
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
 from ocp.problem.cache import once_per_problem
@@ -30,6 +31,7 @@ class NormalForm(Portable):
         controls: where the own controls stand among its states and controls, (nu,).
         rates: which of its controls are the rates of those that are states, in their order.
         last_input: where the states stand that start at the last input.
+        peaks: where the largest values stand among its states, by name.
     """
 
     original: OCP
@@ -41,6 +43,7 @@ class NormalForm(Portable):
     controls: np.ndarray
     rates: np.ndarray
     last_input: slice
+    peaks: dict[str, slice]
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
@@ -61,12 +64,14 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    if not (ocp.unknowns or ocp.rates or ocp.at("integral") or ocp.refers_to_start or is_soft):
+    has_states = ocp.unknowns or ocp.rates or ocp.peaks or ocp.at("integral") or ocp.refers_to_start
+    if not (has_states or is_soft):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
+    peaks = add_peaks(draft)
     start = add_start(draft)
     unknowns = add_unknowns(draft)
     return NormalForm(
@@ -79,4 +84,5 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         controls=draft.own_controls(),
         rates=len(draft.kept) + np.arange(len(draft.moved)),
         last_input=last_input,
+        peaks=peaks,
     )

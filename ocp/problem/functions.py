@@ -7,6 +7,7 @@ import casadi as ca
 
 from ocp.problem.constraint import Constraint, Place
 from ocp.problem.model import Model
+from ocp.problem.peak import Peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,7 @@ class Functions:
         terminal: terminal constraints psi, stacked.
         integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
+        peaks: what the largest values are taken of, stacked.
     """
 
     rate: ca.Function
@@ -41,6 +43,7 @@ class Functions:
     terminal: ca.Function
     integrands: ca.Function
     invariants: ca.Function
+    peaks: ca.Function
 
     @classmethod
     def of(
@@ -52,6 +55,7 @@ class Functions:
         terminal_cost: ca.SX,
         constraints: Sequence[Constraint],
         invariants: Sequence[Constraint],
+        peaks: Sequence[Peak] = (),
     ) -> "Functions":
         """Build them from the parts of a problem; p are all parameters and signals (n_p,)."""
         m, phi = model, terminal_cost
@@ -79,9 +83,10 @@ class Functions:
             terminal=at_an_end("terminal", psi),
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
+            peaks=along("peaks", stacked(peaks)),
         )
 
 
-def stacked(constraints: Iterable[Constraint]) -> ca.SX:
+def stacked(constraints: Iterable[Constraint | Peak]) -> ca.SX:
     """Return the expressions of several constraints as one column."""
     return ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])

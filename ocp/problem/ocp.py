@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_scalar, element_names
+from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -34,6 +34,7 @@ from ocp.problem.parameters import (
     StartValue,
     Unknown,
 )
+from ocp.problem.peak import Peak
 from ocp.problem.portable import Portable
 from ocp.problem.problem_checks import (
     check_distinct,
@@ -78,6 +79,7 @@ class OCP(Portable):
             referee reports how far a solution strays.
         parameters: constants and sampled signals that may change from run to run.
         unknowns: constants that the optimiser chooses.
+        peaks: largest values along the way, as terms of the cost.
         rates: how fast controls may change, and what that costs.
         last_input: what the controls that have a ``Rate`` were just before the start, in their
             order in the model (m,): the rate holds from there on. It is a run argument,
@@ -103,6 +105,7 @@ class OCP(Portable):
     invariants: tuple[Constraint, ...] = ()
     parameters: tuple[Parameter | Signal, ...] = ()
     unknowns: tuple[Unknown, ...] = ()
+    peaks: tuple[Peak, ...] = ()
     rates: tuple[Rate, ...] = ()
     last_input: ArrayLike | None = None
     smoothness: Literal[0, 1, 2] = 2
@@ -165,7 +168,7 @@ class OCP(Portable):
         start = {e.element_hash() for e in ca.vertsplit(self.model.start)}
         written = [
             *(e for e in (self.running_cost, self.terminal_cost) if isinstance(e, ca.SX)),
-            *(c.expression for c in (*self.constraints, *self.invariants)),
+            *(c.expression for c in (*self.constraints, *self.invariants, *self.peaks)),
             self.model.f,
         ]
         return any(s.element_hash() in start for s in ca.symvar(ca.veccat(*written)))
@@ -257,6 +260,7 @@ class OCP(Portable):
             terminal_cost=ca.SX(self.terminal_cost) + price(self.at("terminal")),
             constraints=self.constraints,
             invariants=self.invariants,
+            peaks=self.peaks,
         )
 
     @cached_property
@@ -373,7 +377,7 @@ class OCP(Portable):
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
-        parts = (self.model, *self.constraints, *self.invariants)
+        parts = (self.model, *self.constraints, *self.invariants, *self.peaks)
         return [*super().expressions(), *(e for part in parts for e in part.expressions())]
 
     def describe(self) -> str:
@@ -394,6 +398,7 @@ class OCP(Portable):
             ("invariants", Constraint),
             ("parameters", (Parameter, Signal)),
             ("unknowns", Unknown),
+            ("peaks", Peak),
             ("rates", Rate),
         ):
             entries = getattr(self, what)
@@ -436,14 +441,18 @@ class OCP(Portable):
 
     def _check_terms(self) -> None:
         name, model = self.name, self.model
-        check_distinct(name, "constraint", [c.name for c in (*self.constraints, *self.invariants)])
+        named = (*self.constraints, *self.invariants, *self.peaks)
+        check_distinct(name, "constraint", [part.name for part in named])
         check_distinct(name, "parameter", [e.name for e in (*self.given, *self.unknowns)])
         free = self.start_is_free
         check_free_start(name, model.x_names, self.free_start, self.start_bounds, free)
         self.start_box.sized(model.nx, f"{name}: bounds of the start")
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
-        terms = [model.f, *costs, *[c.expression for c in self.constraints]]
+        for peak in self.peaks:
+            allowed = [model.x, model.u, model.t, self.p]
+            refuse_foreign_symbols(peak.expression, allowed, f"{name}: peak '{peak.name}'")
+        terms = [model.f, *costs, *[c.expression for c in (*self.constraints, *self.peaks)]]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
 
