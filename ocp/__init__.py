@@ -34,6 +34,7 @@ from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Parameter, Signal, Unknown
+from ocp.problem.peak import Peak
 from ocp.problem.rate import Rate
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
 from ocp.solution.solution import Solution, Work
@@ -70,6 +71,7 @@ __all__ = [
     "Model",
     "OCPError",
     "Parameter",
+    "Peak",
     "Phases",
     "PhasesEvaluation",
     "PhasesSolution",

@@ -29,7 +29,7 @@ class Plant:
     from the controller's problem in anything (parameters, dynamics, obstacles).
 
     Args:
-        ocp: truth, cost and constraints; its horizon does not count.
+        ocp: truth, cost and constraints; its horizon does not count, nor do its peaks.
         substeps: steps of RK4 in each sampling interval.
         process_noise: standard deviation of what is added to the state, per root of a second.
         measurement_noise: standard deviation of what is added to each measurement (nx,).

@@ -53,6 +53,8 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
     if not ocp.model.nu:
         raise UnsupportedProblem(f"{ocp.name}: the linear solvers need a control, there is none")
     refuse_free_start(ocp, "a linear solver")
+    for peak in ocp.peaks:
+        raise UnsupportedProblem(f"{ocp.name}: the peak of '{peak.name}' is not quadratic")
     for name in ocp.control_rates.names:
         raise UnsupportedProblem(
             f"{ocp.name}: the {name} is no part of A, B, Q, R: LinearMPC and Riccati take it by "

@@ -12,6 +12,7 @@ from ocp.checks.errors import ProblemError
 from ocp.method.own_controls import own_controls
 from ocp.method.rewriting import Rewriting, RewrittenGuess
 from ocp.normal_form.normal_form import NormalForm
+from ocp.normal_form.peaks import largest
 from ocp.problem.data_residuals import data_cost
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
@@ -149,6 +150,11 @@ class _Added:
             # Of a control that is a state itself; in discrete time of the one before.
             before = u if len(form.rates) else np.vstack([u[:1], u[:-1]])
             whole[:, form.last_input] = before[:, rates.index]
+        if form.peaks and u is not None:
+            along = self._along(form.original.functions.peaks, fractions, x, u)
+            tops = largest(form.original.peaks, along)
+            for at, top in zip(form.peaks.values(), tops, strict=True):
+                whole[:, at] = top
         if form.integrals and u is not None:
             along = self._along(form.original.functions.integrands, fractions, x, u)
             rates = np.split(along, np.cumsum([c.size for c in form.original.at("integral")]), 1)

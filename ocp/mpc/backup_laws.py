@@ -95,6 +95,7 @@ def _endless(ocp: OCP, dt: float | None) -> OCP:
         constraints=(),
         state_bounds=Box(),
         parameters=now,
+        peaks=(),
         rates=(),
         last_input=None,
         guess=None,

@@ -151,6 +151,7 @@ class Draft:
             parameters=(*ocp.parameters, *self.steps),
             unknowns=(),
             rates=(),
+            peaks=(),
             last_input=None,
             data=(),
             smoothness=self.smoothness,

@@ -10,6 +10,7 @@ from ocp.normal_form.draft import Draft
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.measurements import DataTerms, add_data
+from ocp.normal_form.peaks import add_peaks
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
 from ocp.problem.cache import once_per_problem
@@ -34,6 +35,7 @@ class NormalForm(Portable):
         rates: which of its controls are the rates of those that are states, in their order.
         last_input: where the states stand that start at the last input.
         data: what measurements at instants have added; None: nothing.
+        peaks: where the largest values stand among its states, by name.
     """
 
     original: OCP
@@ -46,6 +48,7 @@ class NormalForm(Portable):
     controls: np.ndarray
     rates: np.ndarray
     last_input: slice
+    peaks: dict[str, slice]
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
@@ -110,8 +113,8 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    added = ocp.model.nz or ocp.rates or ocp.data or ocp.unknowns or ocp.at("integral")
-    if not (added or is_soft or ocp.refers_to_start):
+    added = ocp.rates or ocp.peaks or ocp.data or ocp.unknowns or ocp.at("integral")
+    if not (added or ocp.model.nz or is_soft or ocp.refers_to_start):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
@@ -120,6 +123,7 @@ def normal_form(ocp: OCP) -> NormalForm | None:
     data = add_data(draft)
     from_start = ocp.used_of_start
     start = add_start(draft, from_start)
+    peaks = add_peaks(draft)
     unknowns = add_unknowns(draft)
     return NormalForm(
         original=ocp,
@@ -133,4 +137,5 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         rates=len(draft.kept) + np.arange(len(draft.moved)),
         last_input=last_input,
         data=data,
+        peaks=peaks,
     )

@@ -12,6 +12,7 @@ from ocp.problem.constraint import Box, Constraint, Soft
 from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import Parameter, Signal, Steps, Unknown
+from ocp.problem.peak import Peak
 from ocp.problem.rate import ControlRates
 
 
@@ -67,6 +68,9 @@ class _Problem(Protocol):
     def unknowns(self) -> tuple[Unknown, ...]: ...
 
     @property
+    def peaks(self) -> tuple[Peak, ...]: ...
+
+    @property
     def control_rates(self) -> ControlRates: ...
 
     @property
@@ -93,11 +97,15 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield f"{ocp.name}   ({m.name}: {', '.join(counted)})"
     yield ""
     stage = f"sum k=0..{ocp.steps - 1} of L" if ocp.steps is not None else f"int 0..{tf} L dt"
-    yield f"  minimise    phi(x({tf}), {tf}) + {stage}"
+    peaks = "".join(f" + {_times(p.weight)}max {p.name}" for p in ocp.peaks)
+    yield f"  minimise    phi(x({tf}), {tf}) + {stage}{peaks}"
     yield f"    L   = {readable(ca.SX(ocp.running_cost))}"
     yield f"    phi = {readable(ca.SX(ocp.terminal_cost))}"
     for each in ocp.data:
         yield f"    + least squares of '{each.name}': {_measured(each)}"
+    for peak in ocp.peaks:
+        rows = ", ".join(readable(row) for row in ca.vertsplit(peak.expression))
+        yield f"    {peak.name} = {rows}"
     yield "  subject to"
     for name, row in zip(m.x_names, ca.vertsplit(m.f), strict=True):
         left = f"{name}[k+1]" if discrete else f"d({name})/dt"
@@ -160,6 +168,10 @@ def _freedom(free: np.ndarray, names: tuple[str, ...]) -> str:
         return ""
     chosen = [name for name, is_free in zip(names, free, strict=True) if is_free]
     return "   (guess)" if free.all() else f"   ({', '.join(chosen)}: guess)"
+
+
+def _times(weight: float) -> str:
+    return "" if weight == 1.0 else f"{weight:g} "
 
 
 def _count(number: int, what: str) -> str:

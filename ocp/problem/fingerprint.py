@@ -40,6 +40,8 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
     }
     if ocp.at("integral"):
         along["integral constraints"] = functions.integrands
+    if ocp.peaks:
+        along["peaks"] = functions.peaks
     values = {name: [f(*point) for point in points] for name, f in along.items()}
     values |= {name: [f(x, t, p) for x, _, t, p in points] for name, f in at_ends.items()}
     parts = {
@@ -62,6 +64,9 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
         parts["data"] = np.concatenate([np.ravel(np.array(v)) for v in (*here, *numbers)])
     if ocp.unknowns:
         parts["unknown constants"] = np.concatenate([_stacked(e.box) for e in ocp.unknowns])
+    if ocp.peaks:
+        weights = [peak.weight for peak in ocp.peaks]
+        parts["peaks"] = np.concatenate([parts["peaks"], weights])
     if len(rates := ocp.control_rates):
         is_given = [ocp.last_input is not None]
         parts["rates"] = np.concatenate([rates.index, _stacked(rates.box), rates.weight, is_given])

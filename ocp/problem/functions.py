@@ -8,6 +8,7 @@ import casadi as ca
 from ocp.problem.constraint import Constraint, Place
 from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
+from ocp.problem.peak import Peak
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class Functions:
         invariants: invariants, stacked; of (x, t, p).
         algebraic: the algebraic variables (nz,).
         measured: what is measured, stacked; of (x, t, p).
+        peaks: what the largest values are taken of, stacked.
     """
 
     rate: ca.Function
@@ -46,6 +48,7 @@ class Functions:
     invariants: ca.Function
     algebraic: ca.Function
     measured: ca.Function
+    peaks: ca.Function
 
     @classmethod
     def of(
@@ -59,6 +62,7 @@ class Functions:
         invariants: Sequence[Constraint],
         algebraic: ca.SX,
         data: Sequence[Measurement],
+        peaks: Sequence[Peak],
     ) -> "Functions":
         """Build them from the parts of a problem without algebraic variables, and those.
 
@@ -91,9 +95,10 @@ class Functions:
             invariants=at_an_end("invariants", stacked(invariants)),
             algebraic=along("algebraic", algebraic),
             measured=at_an_end("measured", stacked(data)),
+            peaks=along("peaks", stacked(peaks)),
         )
 
 
-def stacked(constraints: Iterable[Constraint | Measurement]) -> ca.SX:
-    """Return the expressions of several constraints, or measurements, as one column."""
+def stacked(constraints: Iterable[Constraint | Measurement | Peak]) -> ca.SX:
+    """Return the expressions of several constraints, measurements or peaks as one column."""
     return ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])

@@ -1,6 +1,6 @@
 """The optimal control problem in Bolza form, written once for every solver."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_scalar, element_names
+from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
 from ocp.problem.algebraic import AlgebraicSolution, refuse_unsolvable
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
@@ -38,6 +38,7 @@ from ocp.problem.parameters import (
     Steps,
     Unknown,
 )
+from ocp.problem.peak import Peak
 from ocp.problem.portable import Portable
 from ocp.problem.problem_checks import (
     check_distinct,
@@ -83,6 +84,7 @@ class OCP(Portable):
             referee reports how far a solution strays.
         parameters: constants and sampled signals that may change from run to run.
         unknowns: constants that the optimiser chooses.
+        peaks: largest values along the way, as terms of the cost.
         rates: how fast controls may change, and what that costs.
         last_input: what the controls that have a ``Rate`` were just before the start, in their
             order in the model (m,): the rate holds from there on. It is a run argument,
@@ -109,6 +111,7 @@ class OCP(Portable):
     invariants: tuple[Constraint, ...] = ()
     parameters: tuple[Parameter | Signal | Steps, ...] = ()
     unknowns: tuple[Unknown, ...] = ()
+    peaks: tuple[Peak, ...] = ()
     rates: tuple[Rate, ...] = ()
     last_input: ArrayLike | None = None
     data: tuple[Measurement, ...] = ()
@@ -181,7 +184,7 @@ class OCP(Portable):
         """Which components of the state at the start terms contain."""
         written = [
             *(e for e in (self.running_cost, self.terminal_cost) if isinstance(e, ca.SX)),
-            *(c.expression for c in (*self.constraints, *self.invariants)),
+            *(c.expression for c in (*self.constraints, *self.invariants, *self.peaks)),
             self.model.f,
             self.model.algebraic,
         ]
@@ -280,17 +283,18 @@ class OCP(Portable):
         return AlgebraicSolution.of(self.model)
 
     def terms(self, rewritten: Callable[[ca.SX | float], ca.SX]) -> dict[str, Any]:
-        """Return costs, constraints, invariants and data with every expression rewritten."""
+        """Return costs and all that has an expression with every one rewritten."""
 
-        def each(constraints: tuple[Constraint, ...]) -> tuple[Constraint, ...]:
-            return tuple(replace(c, expression=rewritten(c.expression)) for c in constraints)
+        def each(parts: Iterable[Constraint | Peak | Measurement]) -> tuple[Any, ...]:
+            return tuple(replace(part, expression=rewritten(part.expression)) for part in parts)
 
         return {
             "running_cost": rewritten(self.running_cost),
             "terminal_cost": rewritten(self.terminal_cost),
             "constraints": each(self.constraints),
             "invariants": each(self.invariants),
-            "data": tuple(replace(m, expression=rewritten(m.expression)) for m in self.data),
+            "peaks": each(self.peaks),
+            "data": each(self.data),
         }
 
     @cached_property
@@ -305,6 +309,7 @@ class OCP(Portable):
             constraints=plain.constraints,
             invariants=plain.invariants,
             data=plain.data,
+            peaks=plain.peaks,
             algebraic=self.algebraic_solution.values,
         )
 
@@ -407,7 +412,7 @@ class OCP(Portable):
 
     def expressions(self) -> list[ca.SX]:
         """Return all expressions: its own, of the model and of the constraints."""
-        parts = (self.model, *self.constraints, *self.invariants, *self.data)
+        parts = (self.model, *self.constraints, *self.invariants, *self.peaks, *self.data)
         return [*super().expressions(), *(e for part in parts for e in part.expressions())]
 
     def describe(self) -> str:
@@ -428,6 +433,7 @@ class OCP(Portable):
             ("invariants", Constraint),
             ("parameters", (Parameter, Signal, Steps)),
             ("unknowns", Unknown),
+            ("peaks", Peak),
             ("rates", Rate),
             ("data", Measurement),
         ):
@@ -471,7 +477,8 @@ class OCP(Portable):
 
     def _check_terms(self) -> None:
         name, model = self.name, self.model
-        check_distinct(name, "constraint", [c.name for c in (*self.constraints, *self.invariants)])
+        named = (*self.constraints, *self.invariants, *self.peaks)
+        check_distinct(name, "constraint", [part.name for part in named])
         check_distinct(name, "parameter", [e.name for e in (*self.given, *self.unknowns)])
         free = self.start_is_free
         check_free_start(name, model.x_names, self.free_start, self.start_bounds, free)
@@ -479,7 +486,10 @@ class OCP(Portable):
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         check_data(self, self.entries)
-        terms = [c.expression for c in (*self.constraints, *self.data)]
+        allowed = [model.x, model.u, model.t, self.p, model.z]
+        for peak in self.peaks:
+            refuse_foreign_symbols(peak.expression, allowed, f"{name}: peak '{peak.name}'")
+        terms = [c.expression for c in (*self.constraints, *self.peaks, *self.data)]
         terms += [model.f, model.algebraic, *costs]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)

@@ -20,6 +20,7 @@ from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, ProblemRo
 from ocp.problem.model import Model
 from ocp.problem.nominal_sizes import Sizes, nominal_sizes
 from ocp.problem.ocp import OCP
+from ocp.problem.peak import Peak
 from ocp.problem.rate import Rate
 
 InSizes = Callable[[ca.SX | float, np.ndarray | float], ca.SX]
@@ -83,6 +84,10 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         start_bounds=_box(ocp.start_bounds, rounded.x),
         parameters=ocp.parameters,
         unknowns=ocp.unknowns,
+        peaks=tuple(
+            Peak(peak.name, in_sizes(peak.expression, 1.0), peak.weight / rounded.cost)
+            for peak in ocp.peaks
+        ),
         rates=_rates(ocp, rounded),
         last_input=_last_input(ocp, rounded.u),
         smoothness=ocp.smoothness,

@@ -13,7 +13,7 @@ from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
 from ocp.referee.segments import defects, gaps, growth, worth
 from ocp.referee.stationarity import final_costate, stationarity
-from ocp.referee.violation import invariant_drift, largest_violation
+from ocp.referee.violation import invariant_drift, largest_violation, peaks
 from ocp.solution.composite import CompositeSolution, V
 from ocp.solution.control_rate import price_of_rates
 from ocp.solution.solution import Solution
@@ -110,7 +110,7 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
     in_open_loop = truth.replay == "open loop"
     gap = None if in_open_loop else float(gaps(solution, truth).max())
     return Evaluation(
-        cost=truth.cost + price,
+        cost=truth.cost + price + _price_of_peaks(solution, truth),
         cost_error=truth.cost_error + (0.0 if in_open_loop else worth(solution, truth)),
         violation=violation.amount,
         worst=violation.where if violation.amount > 0.0 else worst,
@@ -123,6 +123,11 @@ def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
         resolution=truth.resolution,
         truth=truth,
     )
+
+
+def _price_of_peaks(solution: Solution, truth: ReferenceTrajectory) -> float:
+    """What the largest values along the way cost, as far as they are looked at."""
+    return float(np.dot([p.weight for p in solution.problem.peaks], peaks(solution, truth)))
 
 
 def _stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | None:

@@ -5,9 +5,11 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ocp.normal_form.peaks import largest
 from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Constraint
-from ocp.problem.constraint_rows import ConstraintRows, Violation
+from ocp.problem.constraint_rows import ConstraintRows, Violation, depends_on
+from ocp.problem.functions import stacked
 from ocp.problem.ocp import OCP
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 from ocp.solution.control_rate import limited_rates
@@ -35,6 +37,30 @@ def integrals(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
     return truth.integral(*_on_steps(solution.problem.functions.integrands, truth, truth.ends))
 
 
+def peaks(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
+    """Return the largest value of each peak along the trajectory, (k,)."""
+    ocp = solution.problem
+    if not ocp.peaks:
+        return np.empty(0)
+    values = np.vstack(_along_steps(ocp, ocp.functions.peaks, stacked(ocp.peaks), truth))
+    return largest(ocp.peaks, values)
+
+
+def _along_steps(
+    ocp: OCP, function: ca.Function, expression: ca.SX, truth: ReferenceTrajectory
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows (K, m) at the starts of the steps and at their ends.
+
+    In discrete time a control belongs to the start of its step alone: at the ends the rows with
+    one are those of the start again.
+    """
+    at_start, at_end = _on_steps(function, truth, truth.x[1:])
+    if ocp.model.is_discrete:
+        on_control = depends_on(expression, ocp.model.u)
+        at_end[:, on_control] = at_start[:, on_control]
+    return at_start, at_end
+
+
 def _on_steps(
     function: ca.Function, truth: ReferenceTrajectory, after: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -48,18 +74,12 @@ def _on_steps(
 def path_values(
     solution: Solution, truth: ReferenceTrajectory
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield path constraints (K, m) and times (K,), at the starts of the steps and at the ends.
-
-    In discrete time a control belongs to the start of its step alone: at the ends its
-    constraints are those of the start again.
-    """
+    """Yield path constraints (K, m) and times (K,), at the starts of the steps and at the ends."""
     ocp = solution.problem
     if not ocp.at("path"):
         return
-    at_start, at_end = _on_steps(ocp.functions.path, truth, truth.x[1:])
-    if ocp.model.is_discrete:
-        on_control = ocp.rows.path.on_control
-        at_end[:, on_control] = at_start[:, on_control]
+    expression = ocp.rows.path.expression
+    at_start, at_end = _along_steps(ocp, ocp.functions.path, expression, truth)
     yield at_start, truth.t[:-1]
     yield at_end, truth.t[1:]
 

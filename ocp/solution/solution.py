@@ -208,6 +208,14 @@ class Solution:
         return {name: costate[at] for name, at in form.unknowns.items()} | last
 
     @property
+    def peaks(self) -> dict[str, float]:
+        """The largest values along the way, by name, as the solver has them at its nodes."""
+        form = None if self.normal is None else normal_form(self.problem)
+        if form is None or self.normal is None:
+            return {}
+        return {name: float(self.normal.x[0, at][0]) for name, at in form.peaks.items()}
+
+    @property
     def multipliers(self) -> dict[str, np.ndarray]:
         """The price of every integral constraint, by name: dJ*/d(upper bound) is minus it."""
         if self.normal is None:
