@@ -171,7 +171,7 @@ class Transcription:
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         by_stage = ca.vertcat(z[:, 1:] - after, inside)
         g = ca.vertcat(
-            by_stage[:, 0], first, ca.vec(by_stage[:, 1:]), self._last(x[:, -1], t_final, p_final)
+            by_stage[:, 0], first, ca.vec(by_stage[:, 1:]), self.last(x[:, -1], t_final, p_final)
         )
         f = ca.sum2(costs) + ocp.functions.terminal_cost(x[:, -1], t_final, p_final)
         return {"x": w, "f": f, "g": g, "p": data}
@@ -195,7 +195,7 @@ class Transcription:
                 rows.append(replace(row, node=k, **bounds))
             if k == 0:
                 rows += ocp.rows.initial.rows
-        rows += [replace(row, node=self.n) for row in self._last_rows.rows]
+        rows += [replace(row, node=self.n) for row in self.last_rows.rows]
         return tuple(rows)
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:
@@ -289,12 +289,13 @@ class Transcription:
         return np.array([row.place == place for row in self.rows])
 
     @cached_property
-    def _last_rows(self) -> ConstraintRows:
+    def last_rows(self) -> ConstraintRows:
         """What holds at the last node: path constraints without a control, and the end's own."""
         rows = self.ocp.rows
         return rows.path.where(~rows.path.on_control) + rows.terminal
 
     @cached_property
-    def _last(self) -> ca.Function:
+    def last(self) -> ca.Function:
+        """Those rows as a Function of (x, t, p)."""
         m = self.ocp.model
-        return ca.Function("last", [m.x, m.t, self.ocp.p], [self._last_rows.expression])
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [self.last_rows.expression])

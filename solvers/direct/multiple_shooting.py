@@ -22,8 +22,9 @@ from ocp.internal import (
     least_violating,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
-from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 from solvers.direct.weak_method import weak_method

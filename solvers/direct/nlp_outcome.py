@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp import Status, Work
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 
 
 class OtherStart(NamedTuple):

@@ -17,8 +17,9 @@ from ocp import Status
 from ocp.internal import RunData, start_violation
 from solvers.direct.curvature_check import has_negative_curvature
 from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
-from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_backends import Nlp
 from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
 from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved

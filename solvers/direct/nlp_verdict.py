@@ -10,7 +10,8 @@ import numpy as np
 from ocp import Status
 from ocp.internal import ConstraintRow, RunData, Violation, start_violation
 from solvers.direct.fitted_multipliers import with_fitted_multipliers
-from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_backends import Nlp
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.optimality_residual import OptimalityCheck
 from solvers.direct.return_words import ACCEPTABLE, meaning
 from solvers.direct.transcribed_problem import TranscribedProblem
