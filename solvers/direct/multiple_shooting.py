@@ -45,7 +45,9 @@ class MultipleShooting(ScalingSolver):
             signals, which are nodes where there are intervals enough; a discrete-time problem
             brings its own number.
         integrator: one-step method in each interval.
-        backend: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
+        backend: ``"ipopt"``; ``"fatrop"``, which exploits the stages; or ``"native"``, which does
+            so in C that is generated for the problem: it needs a C compiler, and starts warm from
+            a guess with costates.
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
@@ -66,7 +68,7 @@ class MultipleShooting(ScalingSolver):
 
     intervals: int = 75
     integrator: Integrator = field(default_factory=RK4)
-    backend: Literal["ipopt", "fatrop"] = "ipopt"
+    backend: Literal["ipopt", "fatrop", "native"] = "ipopt"
     tolerance: float = 1e-9
     max_iterations: int = 300
     accuracy: float = 1e-2
@@ -155,7 +157,7 @@ class MultipleShootingProgram(MethodProgram):
             return self.transcription.join(*self._iterate(data, guess, duration, source))
 
         w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
-        outcome = self._nlp_run.solve(w0, data, others)
+        outcome = self._nlp_run.solve(w0, data, others, self._costate(guess))
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
             outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
             return self._result(data, outcome, self._without_slope)
@@ -179,7 +181,10 @@ class MultipleShootingProgram(MethodProgram):
 
     @cached_property
     def _nlp_run_without_slope(self) -> NlpRun:
-        nlp = self.solver.nlp_backend.build(self._without_slope)
+        backend = self.solver.nlp_backend
+        if backend.name == "native":  # its stages know no start that is data
+            backend = replace(backend, name="ipopt")
+        nlp = backend.build(self._without_slope)
         return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
 
     # -- the first iterate -------------------------------------------------------------------
@@ -196,6 +201,13 @@ class MultipleShootingProgram(MethodProgram):
         x, u = self.grid.first_iterate(data, guess, duration, source)
         length = duration / self.transcription.time_unit
         return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
+
+    def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
+        """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""
+        nodes, nx = self.grid.fractions, self.ocp.model.nx
+        if self.solver.backend != "native" or guess is None or guess.sample("x", nodes, nx) is None:
+            return None
+        return guess.sample("costate", nodes, nx)
 
     # -- the result ---------------------------------------------------------------------------
 

@@ -71,6 +71,10 @@ class NlpOutcome:
         """Whether a backend met a number that is not finite."""
         return any(result.is_undefined for result in self.results)
 
+    def told_by(self, words: str) -> "NlpOutcome":
+        """Return this outcome with something more in its message."""
+        return replace(self, message=f"{self.message}; {words}" if self.message else words)
+
     def after(self, earlier: "NlpOutcome") -> "NlpOutcome":
         """Return this outcome with the work of an earlier one."""
         return replace(self, results=(*earlier.results, *self.results))
