@@ -10,13 +10,11 @@ import numpy as np
 
 from ocp import OCP, Integrator
 from ocp.internal import Stage, StageInputs, StageTape, Transcription, node_widths
+from solvers.direct.native.lane_code import lane_code
 
 _CORE = Path(__file__).with_name("core")
 # In the order in which the compiler reads them.
-_FILES = tuple(
-    f"{name}.h"
-    for name in ("workspace", "evaluate", "riccati", "barrier", "line_search", "solve", "entry")
-)
+_FILES = ("workspace", "evaluate", "riccati", "barrier", "line_search", "solve", "entry")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,29 +77,30 @@ class StageCode:
         """Values, and values with derivatives: of a stage, of the start, of the end."""
         return (*self._stage(), *self._start(), *self._end())
 
-    def _stage(self) -> tuple[ca.Function, ca.Function]:
+    def _stage(self) -> tuple[ca.Function, ...]:
         tr, ocp, s = self.transcription, self.transcription.ocp, self._symbols
         h = self._duration * s.width
         given = [s.state, s.u, self._time, h, s.left, s.right]
         after, cost = Stage.of(ocp, tr.integrator, held=True).step.call(given)
         path = ocp.functions.path(s.state, s.u, self._time, s.left)
-        final_time = s.x[ocp.model.nx :]
+        final_time = [s.x[ocp.model.nx]] if ocp.has_free_time else []
         costate, y = ca.SX.sym("lambda", self.nx), ca.SX.sym("y", self.row_counts[0])
         # What the tape differentiates along, (x, u) or (x, u, t, h), as linear in w.
         inputs = ca.vertcat(*given[: 4 if ocp.has_free_time else 2])
         along = ca.jacobian(inputs, s.w)
         tape = _tape(ocp, tr.integrator).call([*given, costate[: ocp.model.nx]])
         end, end_cost, jacobian, gradient, hessian = tape
-        slope = ca.vertcat(jacobian @ along, ca.jacobian(final_time, s.w))
+        slope = ca.vertcat(jacobian @ along, *[ca.jacobian(each, s.w) for each in final_time])
         c_slope, c_hessian = _derivatives(path, y, s.w)
         derivatives = [slope.T, (gradient @ along).T, c_slope.T]
         second = along.T @ hessian @ along + c_hessian
         arguments = [s.x, s.u, s.d]
-        values = [ca.vertcat(after, final_time), cost, path]
-        full = [ca.vertcat(end, final_time), end_cost, path, *derivatives, second]
+        values = [ca.vertcat(after, *final_time), cost, path]
+        first = [ca.vertcat(end, *final_time), end_cost, path, *derivatives]
         return (
             _function("stage_value", arguments, values),
-            _function("stage_full", [*arguments, costate, y], full),
+            _function("stage_slope", [*arguments, costate, y], first),
+            _function("stage_full", [*arguments, costate, y], [*first, second]),
         )
 
     def _start(self) -> tuple[ca.Function, ca.Function]:
@@ -150,21 +149,20 @@ class StageCode:
 
     @property
     def code(self) -> str:
-        """The whole translation unit."""
-        return "\n".join([self._sizes, _generated(self.functions), *map(_read, _FILES)])
+        """The whole translation unit.
+
+        Raises:
+            UnsupportedProblem: for an operation that cannot be written so.
+        """
+        functions = lane_code(self.functions, self.transcription.ocp.name)
+        return "\n".join([read("lanes"), self._sizes, functions, *map(read, _FILES)])
 
     @property
     def _sizes(self) -> str:
         """What ``workspace.h`` asks for."""
         nc, ni, ne = self.row_counts
-        scratch = {
-            "ARGS": max(f.sz_arg() for f in self.functions),
-            "RESULTS": max(f.sz_res() for f in self.functions),
-            "IWORK": max(f.sz_iw() for f in self.functions),
-            "WORK": max(f.sz_w() for f in self.functions),
-        }
         sizes = {"NX": self.nx, "NU": self.nu, "NW": self.nu + self.nx, "NB": len(self.bounded)}
-        sizes |= {"NC": nc, "NI": ni, "NE": ne, "ND": self.nd, **scratch}
+        sizes |= {"NC": nc, "NI": ni, "NE": ne, "ND": self.nd}
         lines = [f"#define {name} {value}" for name, value in sizes.items()]
         entries = ", ".join(map(str, self.bounded or (0,)))
         return "\n".join([*lines, f"static const int bounded[] = {{{entries}}};"])
@@ -237,13 +235,6 @@ def _function(name: str, arguments: list[ca.SX], values: list[ca.SX]) -> ca.Func
     return ca.Function(name, arguments, ca.cse([ca.densify(value) for value in values]))
 
 
-def _generated(functions: tuple[ca.Function, ...]) -> str:
-    """Return the C of some functions, visible in their own unit alone."""
-    generator = ca.CodeGenerator("node", {"with_export": False, "with_header": False})
-    for function in functions:
-        generator.add(function)
-    return generator.dump()
-
-
-def _read(name: str) -> str:
-    return (_CORE / name).read_text(encoding="utf-8")
+def read(name: str) -> str:
+    """Return a file of the fixed part."""
+    return (_CORE / f"{name}.h").read_text(encoding="utf-8")

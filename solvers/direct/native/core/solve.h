@@ -40,7 +40,7 @@ static void start_side(double distance, double width, double mu, int warm, doubl
 
 /* Costates and multipliers of equations that leave as little of the gradient as they can, in the
  * least squares: the Newton step of a program whose Hessian is the unit matrix. Where they are
- * huge, as where equations depend on each other, 0. Needs evaluate_all(), and slacks. */
+ * huge, as where equations depend on each other, 0. Needs evaluate_at_iterate(), and slacks. */
 static void fit_multipliers(Workspace *s) {
   for (int k = 0; k <= s->n; k++)
     for (int i = 0; i < NW * NW; i++)
@@ -74,7 +74,7 @@ static void start_barrier(Workspace *s, double mu, int warm) {
     s->ds_low[i] = s->ds_up[i] = s->dz_low[i] = s->dz_up[i] = 0.0;
     s->corr_low[i] = s->corr_up[i] = 0.0;
   }
-  evaluate_all(s);
+  evaluate_at_iterate(s, 1);
   for (int i = 0; i < s->rows; i++) s->force[i] = 0.0;
   for (int k = 0; k <= s->n; k++) {
     double g[NW];
@@ -97,8 +97,9 @@ static void start_barrier(Workspace *s, double mu, int warm) {
     else
       s->z_up[i] = 0.0;
   }
-  if (!warm) fit_multipliers(s);
-  evaluate_all(s);
+  if (warm) return; /* the Hessian has had the costates */
+  fit_multipliers(s);
+  evaluate_at_iterate(s, 1);
 }
 
 /* Take a share of the step in x, u, lambda, y and slacks, and another one in z. */
@@ -228,7 +229,7 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     start_barrier(s, s->mu, warm);
   }
   double best = INFINITY;
-  int since_best = 0;
+  int since_best = 0, second = 1;
   for (;;) {
     weigh(s);
     s->left = residuals(s, 0.0);
@@ -240,6 +241,7 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     if (is_far(s)) return DIVERGED;
     s->seconds = before + clock_seconds() - started;
     if (s->seconds > o->time_limit) return TIME_LIMIT;
+    if (!second) evaluate_at_iterate(s, 1);
     if (s->seconds - before > o->pause) return PAUSED;
     since_best = error < 0.9999 * best ? 0 : since_best + 1;
     best = least(best, error);
@@ -247,6 +249,8 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     if (s->is_monotone) lower_barrier(s, floor);
     if (!step(s, floor)) return NO_STEP;
     s->iteration++;
-    evaluate_all(s);
+    /* Where this step was the last one, as Newton's method promises, no more is needed. */
+    second = error > sqrt(o->tolerance) || s->length < 1.0 || s->mu > 10.0 * floor;
+    evaluate_at_iterate(s, second);
   }
 }

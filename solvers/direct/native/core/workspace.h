@@ -7,18 +7,18 @@
  *   NB             number of entries of w that may have a bound; bounded[NB]: which
  *   NC, NI, NE     rows of every stage, rows of the start alone, rows of the end
  *   ND             data of a node (times and parameters)
- *   ARGS, RESULTS, IWORK, WORK   what the generated functions need as scratch memory
  *
- * and, with the calling convention of CasADi (arguments, results, scratch memory), where x is
- * (NX), u (NU), d (ND), lambda (NX), y as many as rows, and matrices are stored row by row:
+ * and functions of arrays of lanes (see lanes.h), which take their arguments one after the other and
+ * return their values so; x is (NX), u (NU), d (ND), lambda (NX), y as many as rows, and matrices
+ * are stored row by row:
  *
  *   stage_value(x, u, d)                next state F, cost l, rows c
  *   stage_full(x, u, d, lambda, y)      F, l, c, F_w, l_w, c_w, (l + lambda'F + y'c)_ww
+ *   stage_slope(x, u, d, lambda, y)     the same without the last
  *   start_value(x, d), start_full(x, d, y)   c   |   c, c_w, (y'c)_ww
  *   end_value(x, d), end_full(x, d, y)       l, c   |   l, c, l_w, c_w, (l + y'c)_ww
  */
 
-#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -116,12 +116,6 @@ typedef struct {
   double filter_theta[FILTER], filter_phi[FILTER];
   double seconds; /* used so far */
   Note notes[NOTED];
-
-  /* Scratch memory of the generated functions. */
-  const double *arg[AT_LEAST_1(ARGS)];
-  double *res[AT_LEAST_1(RESULTS)];
-  long long iwork[AT_LEAST_1(IWORK)];
-  double work[AT_LEAST_1(WORK)];
 } Workspace;
 
 /* Where the constrained quantities of node k begin in the flat arrays. */
