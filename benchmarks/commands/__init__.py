@@ -12,7 +12,7 @@ from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
-from benchmarks.commands.speed import ARM_SPEED, SPEED
+from benchmarks.commands.speed import ARM_SPEED, NATIVE_SPEED, SPEED
 
 COMMANDS: tuple[Command, ...] = (
     LIST,
@@ -23,6 +23,7 @@ COMMANDS: tuple[Command, ...] = (
     FIGURES_COMMAND,
     SPEED,
     ARM_SPEED,
+    NATIVE_SPEED,
     GREEDY,
     CLEAR,
     MPC,

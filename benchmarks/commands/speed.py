@@ -1,4 +1,4 @@
-"""``speed`` and ``arm-speed``: what a step of linear control and of MPC on the arm costs."""
+"""``speed``, ``arm-speed``, ``native-speed``: what a step of control, or one solve, costs."""
 
 from argparse import ArgumentParser, Namespace
 
@@ -10,6 +10,7 @@ from benchmarks.speed.arm import INTERVALS, LINKS
 from benchmarks.speed.arm_tables import print_arm_speed
 from benchmarks.speed.linear import HORIZONS
 from benchmarks.speed.linear_tables import print_speed
+from benchmarks.speed.native import measured, native_table, races
 
 
 def _linear_options(parser: ArgumentParser) -> None:
@@ -40,5 +41,18 @@ def _arm(options: Namespace, console: Console) -> int:
     return 0
 
 
+def _native_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--count", type=positive, default=40, metavar="K", help="solves measured")
+
+
+def _native(options: Namespace, console: Console) -> int:
+    for race in races():
+        console.print(native_table(race, measured(race, options.count)))
+    return 0
+
+
 SPEED = Command("speed", "linear control: a step over N", _linear_options, _linear)
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
+NATIVE_SPEED = Command(
+    "native-speed", "the native backend: one solve beside others", _native_options, _native
+)

@@ -87,13 +87,13 @@ class Transcription:
         stages = w[: -self.nz].reshape(self.n, -1)
         return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
 
-    @property
+    @cached_property
     def is_control(self) -> np.ndarray:
         """Which unknowns are controls, bool (size,)."""
         z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
         return self.join(z, u).astype(bool)
 
-    @property
+    @cached_property
     def is_later_state(self) -> np.ndarray:
         """Which unknowns are states after the start, bool (size,)."""
         z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)
@@ -200,12 +200,22 @@ class Transcription:
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:
         """Return lbx, ubx, lbg, ubg for a start."""
+        ocp, result = self.ocp, {}
+        for key, side in (("lbx", "lower"), ("ubx", "upper")):
+            bound = self._bounds[key].copy()
+            at_start = np.asarray(getattr(ocp.start_box, side))
+            bound[: ocp.model.nx] = ocp.start_of(data.x0, at_start)
+            result[key] = bound
+        return result | {key: self._bounds[key].copy() for key in ("lbg", "ubg")}
+
+    @cached_property
+    def _bounds(self) -> dict[str, np.ndarray]:
+        """What does not depend on the start."""
         ocp, nu = self.ocp, self.ocp.model.nu
         state, time, control = ocp.state_bounds, ocp.time_box, ocp.control_bounds
         result = {}
         for key, side in (("lbx", "lower"), ("ubx", "upper")):
             z = np.tile(np.asarray(getattr(state, side)), (self.n + 1, 1))
-            z[0] = ocp.start_of(data.x0, np.asarray(getattr(ocp.start_box, side)))
             if ocp.has_free_time:
                 bound = np.asarray(getattr(time, side))[0] / self.time_unit
                 z = np.hstack([z, np.full((self.n + 1, 1), bound)])
@@ -286,7 +296,13 @@ class Transcription:
     # -- pieces ---------------------------------------------------------------------------
 
     def _at(self, place: str) -> np.ndarray:
-        return np.array([row.place == place for row in self.rows])
+        return self._places[place]
+
+    @cached_property
+    def _places(self) -> dict[str, np.ndarray]:
+        """Which rows are of a place, bool (m,)."""
+        places = np.array([row.place for row in self.rows])
+        return {place: places == place for place in ("dynamics", "path", "initial")}
 
     @cached_property
     def last_rows(self) -> ConstraintRows:

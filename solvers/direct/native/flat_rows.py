@@ -16,14 +16,18 @@ class FlatRows:
     the program keeps bounds of the unknowns (x, u) and rows apart, see ``Transcription``.
 
     Attributes:
-        in_unknowns: of every flat entry its place among the unknowns, or -1.
-        in_rows: of every flat entry its place among the rows of g, or -1.
+        bounded: the flat entries that are unknowns.
+        in_unknowns: their places among the unknowns.
+        rows: the flat entries that are rows.
+        in_rows: their places among the rows of g.
         gaps: places of the gaps among the rows of g, (N, nx).
         x: places of x among the unknowns, (N + 1, nx).
         u: places of u among the unknowns, (N, nu).
     """
 
+    bounded: np.ndarray
     in_unknowns: np.ndarray
+    rows: np.ndarray
     in_rows: np.ndarray
     gaps: np.ndarray
     x: np.ndarray
@@ -46,36 +50,37 @@ class FlatRows:
             unknowns += [*w[k, list(code.bounded)], *[-1] * count]
             rows += [*[-1] * len(code.bounded), *range(at, at + count)]
             at += count
-        return cls(np.array(unknowns, dtype=int), np.array(rows, dtype=int), np.array(gaps), x, u)
+        places = (np.array(each, dtype=int) for each in (unknowns, rows))
+        (bounded, in_unknowns), (flat, in_rows) = (
+            (chosen := np.flatnonzero(each >= 0), each[chosen]) for each in places
+        )
+        return cls(bounded, in_unknowns, flat, in_rows, np.array(gaps), x, u)
 
     def put_bounds(self, at: NativeArrays, bounds: dict[str, np.ndarray]) -> None:
         """Write bounds lbx, ubx, lbg, ubg into the arrays; equal ones of x_0 and u are given."""
         given = bounds["lbx"] == bounds["ubx"]
         at.x_given[:] = given[self.x[0]]
         at.u_given[:] = given[self.u]
-        of_unknowns, of_rows = self.in_unknowns >= 0, self.in_rows >= 0
         for side, free, x, g in (
             (at.low, -np.inf, "lbx", "lbg"),
             (at.up, np.inf, "ubx", "ubg"),
         ):
             side[:] = free
-            side[of_unknowns] = bounds[x][self.in_unknowns[of_unknowns]]
-            side[of_rows] = bounds[g][self.in_rows[of_rows]]
+            side[self.bounded] = bounds[x][self.in_unknowns]
+            side[self.rows] = bounds[g][self.in_rows]
 
     def values(self, at: NativeArrays) -> np.ndarray:
         """Return the rows g."""
-        g = np.zeros(self.gaps.size + np.count_nonzero(self.in_rows >= 0))
+        g = np.empty(self.gaps.size + self.rows.size)
         g[self.gaps] = -at.gap
-        of_rows = self.in_rows >= 0
-        g[self.in_rows[of_rows]] = at.v[of_rows]
+        g[self.in_rows] = at.v[self.rows]
         return g
 
     def lam_g(self, at: NativeArrays) -> np.ndarray:
         """Return the multipliers of the rows g; of the gaps minus the costates."""
-        result = np.zeros(self.gaps.size + np.count_nonzero(self.in_rows >= 0))
+        result = np.empty(self.gaps.size + self.rows.size)
         result[self.gaps] = -at.costate[1:]
-        of_rows = self.in_rows >= 0
-        result[self.in_rows[of_rows]] = (at.z_up - at.z_low + at.y)[of_rows]
+        result[self.in_rows] = (at.z_up - at.z_low + at.y)[self.rows]
         return result
 
     def multipliers_of_bounds(self, at: NativeArrays, gradient: np.ndarray) -> np.ndarray:
@@ -86,8 +91,7 @@ class FlatRows:
             gradient: of the Lagrangian without those, (N + 1, nu + nx) in (u, x).
         """
         result = np.zeros(self.x.size + self.u.size)
-        chosen = self.in_unknowns >= 0
-        result[self.in_unknowns[chosen]] = (at.z_up - at.z_low + at.y)[chosen]
+        result[self.in_unknowns] = (at.z_up - at.z_low + at.y)[self.bounded]
         nu = self.u.shape[1]
         result[self.u] = np.where(at.u_given != 0.0, -gradient[:-1, :nu], result[self.u])
         first = self.x[0]
