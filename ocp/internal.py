@@ -14,13 +14,14 @@ from ocp.checks.arguments import (
 from ocp.checks.interrupts import interruptible
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
-from ocp.codegen.compile import c_code, compiled
+from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
 from ocp.files.draft import replacing, write_file
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import Stage, interpolate
 from ocp.integration.stage_hessian import stage_hessian
+from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.method.blocking_solver import BlockingSolver
@@ -95,12 +96,16 @@ __all__ = [
     "ScalingSolver",
     "Sizes",
     "Stage",
+    "StageInputs",
+    "StageTape",
     "Transcription",
+    "Unbuildable",
     "Violation",
     "WithSlacks",
     "append_line",
     "applied",
     "bernstein",
+    "built_library",
     "c_code",
     "check_callable",
     "check_choice",

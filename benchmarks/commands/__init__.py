@@ -12,7 +12,7 @@ from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
-from benchmarks.commands.speed import ARM_SPEED, PHASES_SPEED, SPEED
+from benchmarks.commands.speed import ARM_SPEED, NATIVE_SPEED, PHASES_SPEED, SPEED
 
 COMMANDS: tuple[Command, ...] = (
     LIST,
@@ -24,6 +24,7 @@ COMMANDS: tuple[Command, ...] = (
     SPEED,
     ARM_SPEED,
     PHASES_SPEED,
+    NATIVE_SPEED,
     GREEDY,
     CLEAR,
     MPC,

@@ -1,4 +1,4 @@
-"""``speed``, ``arm-speed``, ``phases-speed``: what a step of control, a chain of phases cost."""
+"""``speed``, ``arm-speed``, ``phases-speed``, ``native-speed``: what steps and solves cost."""
 
 from argparse import ArgumentParser, Namespace
 
@@ -10,6 +10,7 @@ from benchmarks.speed.arm import INTERVALS, LINKS
 from benchmarks.speed.arm_tables import print_arm_speed
 from benchmarks.speed.linear import HORIZONS
 from benchmarks.speed.linear_tables import print_speed
+from benchmarks.speed.native import measured, native_table, races
 from benchmarks.speed.phases_tables import print_phases_speed
 
 
@@ -50,8 +51,21 @@ def _phases(options: Namespace, console: Console) -> int:
     return 0
 
 
+def _native_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--count", type=positive, default=40, metavar="K", help="solves measured")
+
+
+def _native(options: Namespace, console: Console) -> int:
+    for race in races():
+        console.print(native_table(race, measured(race, options.count)))
+    return 0
+
+
 SPEED = Command("speed", "linear control: a step over N", _linear_options, _linear)
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
 PHASES_SPEED = Command(
     "phases-speed", "phases beside a chain written by hand", _phases_options, _phases
+)
+NATIVE_SPEED = Command(
+    "native-speed", "the native backend: one solve beside others", _native_options, _native
 )

@@ -42,7 +42,7 @@ class InterpretedWarning(UserWarning):
     """A function could not be compiled: it runs interpreted, slower, with the same numbers."""
 
 
-class _Unbuildable(Exception):
+class Unbuildable(Exception):
     """Why there is no machine code, in words."""
 
 
@@ -131,11 +131,11 @@ def compiled(
         if function.is_diff_in() != options["is_diff_in"]:
             function = _tidied(function, options)
     try:
-        library = _library(c_code(function, along), compiler or Compiler())
+        library = built_library(c_code(function, along), compiler or Compiler())
         loaded = _loaded(function.name(), library, options)
         _compare(function, loaded, along)
         return loaded
-    except _Unbuildable as reason:
+    except Unbuildable as reason:
         _announce(f"no compiled functions: {reason}. They run interpreted.")
         return function
 
@@ -154,7 +154,7 @@ def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:
             generator.add(_tidied(each))
         return generator.dump()
     except RuntimeError as error:  # a node of the graph that CasADi cannot write as C
-        raise _Unbuildable(f"{function.name()} cannot be written as C ({error})") from error
+        raise Unbuildable(f"{function.name()} cannot be written as C ({error})") from error
 
 
 def _with_derivatives(function: ca.Function, along: Sequence[str]) -> list[ca.Function]:
@@ -176,7 +176,7 @@ def _compare(function: ca.Function, loaded: ca.Function, along: Sequence[str]) -
                 a, b = np.array(right), np.array(found)
                 known = np.isfinite(a)
                 if not (np.abs(a - b) <= _SAME * (1.0 + np.abs(a)))[known].all():
-                    raise _Unbuildable(
+                    raise Unbuildable(
                         f"the compiled {one.name()} gives other numbers than the interpreted one: "
                         "the compiler is at fault; try Compiler(flags=('-O1',))"
                     )
@@ -195,21 +195,29 @@ def _tidied(function: ca.Function, options: dict | None = None) -> ca.Function:
     return ca.Function(function.name(), inputs, outputs, *names, options)
 
 
-def _library(code: str, compiler: Compiler) -> Path:
-    """Return the library of some C code, built unless it is there as it was built."""
+def built_library(code: str, compiler: Compiler) -> Path:
+    """Return the library of some C code, built unless it is there as it was built.
+
+    Args:
+        code: one translation unit, which needs the mathematical library alone.
+        compiler: which one, and where its libraries are kept; see ``compiled``.
+
+    Raises:
+        Unbuildable: saying why.
+    """
     words = compiler.words(code)
     if not words:
-        raise _Unbuildable(_no_compiler(compiler))
+        raise Unbuildable(_no_compiler(compiler))
     version = _version(tuple(compiler.found), min(_ANSWER, compiler.time_limit))
     if version is None:
-        raise _Unbuildable(f"{shlex.join(compiler.found)} --version does not answer")
+        raise Unbuildable(f"{shlex.join(compiler.found)} --version does not answer")
     key = sha256("\0".join([code, *words, version, _processor()]).encode()).hexdigest()[:32]
     try:
         folder = compiler.folder.absolute()
         folder.mkdir(0o700, parents=True, exist_ok=True)
         return kept_library(folder, key, _SUFFIX) or _build(code, words, compiler, folder / key)
     except OSError as error:
-        raise _Unbuildable(f"the cache cannot be written ({error})") from error
+        raise Unbuildable(f"the cache cannot be written ({error})") from error
 
 
 def _no_compiler(compiler: Compiler) -> str:
@@ -230,15 +238,15 @@ def _build(code: str, command: list[str], compiler: Compiler, stem: Path) -> Pat
         try:
             end, said = run_limited(words, compiler.time_limit, folder)
         except (OSError, ValueError) as error:
-            raise _Unbuildable(f"{shlex.join(command)} cannot be started ({error})") from error
+            raise Unbuildable(f"{shlex.join(command)} cannot be started ({error})") from error
         if end is None:
             limit = f"{compiler.time_limit:g} s"
-            raise _Unbuildable(f"{shlex.join(command)} did not end within {limit}")
+            raise Unbuildable(f"{shlex.join(command)} did not end within {limit}")
         if end != 0 or not built.exists():
             lines = said.strip().splitlines() or ["without a word"]
             if end < 0:
                 lines = [f"it was ended by signal {-end}"]
-            raise _Unbuildable(f"{shlex.join(command)} failed: {lines[0][:200]}")
+            raise Unbuildable(f"{shlex.join(command)} failed: {lines[0][:200]}")
         return keep_library(built, stem)
 
 
@@ -246,7 +254,7 @@ def _loaded(name: str, library: Path, options: dict) -> ca.Function:
     try:
         return ca.external(name, str(library), options)
     except RuntimeError as error:  # what CasADi raises where the library cannot be opened
-        raise _Unbuildable(f"{library}, which was built so, cannot be loaded") from error
+        raise Unbuildable(f"{library}, which was built so, cannot be loaded") from error
 
 
 def _user_cache() -> Path:

@@ -91,13 +91,13 @@ class Transcription:
         stages = w[: -self.nz].reshape(self.n, -1)
         return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
 
-    @property
+    @cached_property
     def is_control(self) -> np.ndarray:
         """Which unknowns are controls, bool (size,)."""
         z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
         return self.join(z, u).astype(bool)
 
-    @property
+    @cached_property
     def is_later_state(self) -> np.ndarray:
         """Which unknowns are states after the start, bool (size,)."""
         z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)
@@ -174,7 +174,7 @@ class Transcription:
             after = ca.vertcat(after, z[nx, :-1])
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
         stages = self._by_stage(z[:, 1:] - after, u, inside)
-        last = self._last(x[:, -1], t_final, p_final)
+        last = self.last(x[:, -1], t_final, p_final)
         g = ca.vertcat(stages[0], first, *stages[1:], last)
         f = ca.sum2(costs) + ocp.functions.terminal_cost(x[:, -1], t_final, p_final)
         return {"x": w, "f": f, "g": g, "p": data}
@@ -213,7 +213,7 @@ class Transcription:
                 rows.append(replace(row, node=k, **bounds))
             if k == 0:
                 rows += ocp.rows.initial.rows
-        rows += [replace(row, node=self.n) for row in self._last_rows.rows]
+        rows += [replace(row, node=self.n) for row in self.last_rows.rows]
         return tuple(rows)
 
     @property
@@ -234,12 +234,22 @@ class Transcription:
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:
         """Return lbx, ubx, lbg, ubg for a start."""
+        ocp, result = self.ocp, {}
+        for key, side in (("lbx", "lower"), ("ubx", "upper")):
+            bound = self._bounds[key].copy()
+            at_start = np.asarray(getattr(ocp.start_box, side))
+            bound[: ocp.model.nx] = ocp.start_of(data.x0, at_start)
+            result[key] = bound
+        return result | {key: self._bounds[key].copy() for key in ("lbg", "ubg")}
+
+    @cached_property
+    def _bounds(self) -> dict[str, np.ndarray]:
+        """What does not depend on the start."""
         ocp, nu = self.ocp, self.ocp.model.nu
         state, time, control = ocp.state_bounds, ocp.time_box, ocp.control_bounds
         result = {}
         for key, side in (("lbx", "lower"), ("ubx", "upper")):
             z = np.tile(np.asarray(getattr(state, side)), (self.n + 1, 1))
-            z[0] = ocp.start_of(data.x0, np.asarray(getattr(ocp.start_box, side)))
             if ocp.has_free_time:
                 bound = np.asarray(getattr(time, side))[0] / self.time_unit
                 z = np.hstack([z, np.full((self.n + 1, 1), bound)])
@@ -320,15 +330,22 @@ class Transcription:
     # -- pieces ---------------------------------------------------------------------------
 
     def _at(self, place: str) -> np.ndarray:
-        return np.array([row.place == place for row in self.rows])
+        return self._places[place]
 
     @cached_property
-    def _last_rows(self) -> ConstraintRows:
+    def _places(self) -> dict[str, np.ndarray]:
+        """Which rows are of a place, bool (m,)."""
+        places = np.array([row.place for row in self.rows])
+        return {place: places == place for place in ("dynamics", "path", "initial")}
+
+    @cached_property
+    def last_rows(self) -> ConstraintRows:
         """What holds at the last node: path constraints without a control, and the end's own."""
         rows = self.ocp.rows
         return rows.path.where(~rows.path.on_control) + rows.terminal
 
     @cached_property
-    def _last(self) -> ca.Function:
+    def last(self) -> ca.Function:
+        """Those rows as a Function of (x, t, p)."""
         m = self.ocp.model
-        return ca.Function("last", [m.x, m.t, self.ocp.p], [self._last_rows.expression])
+        return ca.Function("last", [m.x, m.t, self.ocp.p], [self.last_rows.expression])

@@ -37,8 +37,9 @@ from solvers.direct.first_trajectory import (
     first_states,
     other_starts,
 )
-from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.weak_method import weak_method
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ocp.internal import RunData
 from solvers.collocation.collocated_problem import CollocatedProblem
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 
 
 def costates(tr: CollocatedProblem, answer: NlpResult, data: RunData) -> np.ndarray:

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_verdict import NlpInputs
 
 # A bound or inequality is active where the value is this close to it, relative to 1 + abs(value).

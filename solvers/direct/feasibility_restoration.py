@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.internal import QUIET, BufferedNlp, ConstraintRow
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.transcribed_problem import TranscribedProblem
 
 # Weight of the cost, which only selects one among the least violating trajectories.

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import bmat, csc_matrix, csr_matrix, eye, vstack
 from scipy.sparse.linalg import splu
 
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 
 # A bound may be active where the value is this close to it, relative to 1 + abs(value); what the
 # distance is worth counts as residual.

@@ -22,8 +22,9 @@ from ocp.internal import (
     least_violating,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
-from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
+from solvers.direct.nlp_backends import Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 from solvers.direct.weak_method import weak_method
@@ -44,7 +45,9 @@ class MultipleShooting(BlockingSolver):
             signals, which are nodes where there are intervals enough; a discrete-time problem
             brings its own number. Or a ``Grid`` of unequal ones.
         integrator: one-step method in each interval.
-        backend: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
+        backend: ``"ipopt"``; ``"fatrop"``, which exploits the stages; or ``"native"``, which does
+            so in C that is generated for the problem: it needs a C compiler, and starts warm from
+            a guess with costates.
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
@@ -70,7 +73,7 @@ class MultipleShooting(BlockingSolver):
     intervals: int = 75
     intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=RK4)
-    backend: Literal["ipopt", "fatrop"] = "ipopt"
+    backend: Literal["ipopt", "fatrop", "native"] = "ipopt"
     tolerance: float = 1e-9
     max_iterations: int = 300
     accuracy: float = 1e-2
@@ -161,7 +164,7 @@ class MultipleShootingProgram(MethodProgram):
             return self.transcription.join(*self._iterate(data, guess, duration, source))
 
         w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
-        outcome = self._nlp_run.solve(w0, data, others)
+        outcome = self._nlp_run.solve(w0, data, others, self._costate(guess))
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
             outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
             return self._result(data, outcome, self._without_slope)
@@ -185,7 +188,10 @@ class MultipleShootingProgram(MethodProgram):
 
     @cached_property
     def _nlp_run_without_slope(self) -> NlpRun:
-        nlp = self.solver.nlp_backend.build(self._without_slope)
+        backend = self.solver.nlp_backend
+        if backend.name == "native":  # its stages know no start that is data
+            backend = replace(backend, name="ipopt")
+        nlp = backend.build(self._without_slope)
         return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
 
     # -- the first iterate -------------------------------------------------------------------
@@ -203,6 +209,13 @@ class MultipleShootingProgram(MethodProgram):
         blocks, length = self.transcription.blocks, duration / self.transcription.time_unit
         u = u if blocks is None else blocks.held(u)
         return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
+
+    def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
+        """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""
+        nodes, nx = self.grid.fractions, self.ocp.model.nx
+        if self.solver.backend != "native" or guess is None or guess.sample("x", nodes, nx) is None:
+            return None
+        return guess.sample("costate", nodes, nx)
 
     # -- the result ---------------------------------------------------------------------------
 

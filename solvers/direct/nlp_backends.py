@@ -1,18 +1,18 @@
-"""The nonlinear programming backends IPOPT and fatrop: options, set-up and results.
+"""The nonlinear programming backends: their options, and set up for one problem.
 
-``NlpBackend``: the options; ``Nlp``: a backend set up for one problem; ``NlpResult``: what one
-run of it returns, with finite numbers only but for the cost.
+``NlpBackend``: the options; ``Nlp``: a backend set up for one problem; ``CasadiNlp``: IPOPT or
+fatrop; ``NativeNlp``: the native solver, see ``solvers/direct/native``.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import casadi as ca
 import numpy as np
 
-from ocp import UnsupportedProblem, Work
+from ocp import UnsupportedProblem
 from ocp.internal import (
     QUIET,
     BufferedNlp,
@@ -22,6 +22,11 @@ from ocp.internal import (
     check_positive,
     check_whole,
 )
+from solvers.direct.native.native_library import NativeLibrary, NativeReport
+from solvers.direct.native.native_solve import NativeLimits, NativeSolve
+from solvers.direct.native.stage_code import StageCode
+from solvers.direct.nlp_result import NlpResult
+from solvers.direct.optimality_residual import OptimalityCheck, OptimalityResidual
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
     SubprocessFunction,
@@ -38,7 +43,8 @@ class NlpBackend:
     """A backend with its options, to be checked by ``check``.
 
     Args:
-        name: ``"ipopt"``, or ``"fatrop"``, which exploits the stages.
+        name: ``"ipopt"``; ``"fatrop"``, which exploits the stages; or ``"native"``, which does so
+            in C of its own.
         tolerance: of the optimality conditions.
         max_iterations: limit.
         verbose: let it print.
@@ -50,7 +56,7 @@ class NlpBackend:
             whose gradients depend on each other.
     """
 
-    name: Literal["ipopt", "fatrop"] = "ipopt"
+    name: Literal["ipopt", "fatrop", "native"] = "ipopt"
     tolerance: float = 1e-9
     max_iterations: int = 300
     verbose: bool = False
@@ -63,7 +69,7 @@ class NlpBackend:
         Raises:
             ProblemError: for an unknown backend or a number that is not positive.
         """
-        check_choice(self.name, ("ipopt", "fatrop"), "backend")
+        check_choice(self.name, ("ipopt", "fatrop", "native"), "backend")
         check_flag(self.verbose, "a backend's verbose")
         check_whole(self.max_iterations, "a backend's max_iterations")
         check_positive(self.tolerance, "a backend's tolerance")
@@ -73,8 +79,10 @@ class NlpBackend:
         """Set the backend up for a transcribed problem.
 
         Raises:
-            UnsupportedProblem: for what fatrop cannot treat.
+            UnsupportedProblem: for what the backend cannot treat.
         """
+        if self.name == "native":
+            return self._native(transcription)
         own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
         common = QUIET | {
             "print_time": self.verbose,
@@ -82,7 +90,16 @@ class NlpBackend:
             f"{self.name}.max_iter": self.max_iterations,
         }
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
-        return Nlp(self, function, self._subprocess(function))
+        return CasadiNlp(self, function, self._subprocess(function))
+
+    def _native(self, transcription: TranscribedProblem) -> "NativeNlp":
+        if not isinstance(transcription, Transcription):
+            raise UnsupportedProblem(
+                "the native backend takes the stages of multiple shooting alone"
+            )
+        options = NativeLimits(self.tolerance, self.max_iterations, self.time_limit)
+        library = NativeLibrary.of(StageCode(transcription))
+        return NativeNlp(self, transcription, NativeSolve(library, options))
 
     def _subprocess(self, function: ca.Function) -> SubprocessFunction | None:
         """Return the process for fatrop with a time limit; None: run in this process."""
@@ -116,9 +133,46 @@ class NlpBackend:
         }
 
 
+class Nlp(Protocol):
+    """A backend set up for one problem."""
+
+    @property
+    def backend(self) -> NlpBackend:
+        """The options."""
+        ...
+
+    @property
+    def function(self) -> ca.Function:
+        """A ``casadi.nlpsol`` of the program, whose derivatives are used."""
+        ...
+
+    def solve(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        bounds: dict[str, np.ndarray],
+        costate: np.ndarray | None = None,
+    ) -> NlpResult:
+        """Run the backend; return the first iterate where its result is not finite.
+
+        Args:
+            w0: first iterate.
+            p: data of the problem.
+            bounds: lbx, ubx, lbg, ubg.
+            costate: of the first iterate, (N + 1, nx), where something is known of it.
+        """
+        ...
+
+    def optimality(
+        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> OptimalityResidual:
+        """Return how well a result meets the first-order conditions, without any scaling."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
-class Nlp:
-    """A backend set up for one problem.
+class CasadiNlp:
+    """IPOPT or fatrop, set up for one problem.
 
     Attributes:
         backend: the options.
@@ -130,14 +184,14 @@ class Nlp:
     function: ca.Function
     subprocess: SubprocessFunction | None = None
 
-    def solve(self, w0: np.ndarray, p: np.ndarray, bounds: dict[str, np.ndarray]) -> "NlpResult":
-        """Run the backend; return the first iterate where its result is not finite.
-
-        Args:
-            w0: first iterate.
-            p: data of the problem.
-            bounds: lbx, ubx, lbg, ubg.
-        """
+    def solve(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        bounds: dict[str, np.ndarray],
+        costate: np.ndarray | None = None,
+    ) -> NlpResult:
+        """Run the backend, see ``Nlp``; costates are of no use to it."""
         inputs = {"x0": w0, "p": p, **bounds}
         try:
             raw, stats = self.subprocess(inputs) if self.subprocess else self._here(inputs)
@@ -158,68 +212,56 @@ class Nlp:
         """What runs it in this process."""
         return BufferedNlp(self.function)
 
+    def optimality(
+        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> OptimalityResidual:
+        """Return how well a result meets the first-order conditions, see ``Nlp``."""
+        return self._check(result, p, bounds)
+
+    @cached_property
+    def _check(self) -> OptimalityCheck:
+        return OptimalityCheck(self.function)
+
 
 @dataclass(frozen=True, eq=False)
-class NlpResult:
-    """What one run of a backend returned; every number is finite but the cost.
+class NativeNlp:
+    """The native solver, set up for one problem.
 
     Attributes:
-        w: unknowns, within their bounds.
-        cost: inf where the backend met a number that is not finite.
-        g: constraints.
-        lam_x: multipliers of the bounds.
-        lam_g: multipliers of the constraints.
-        stats: the backend's statistics.
-        is_lost: whether its process ended before it returned.
-        residual: of the first-order conditions, where it was judged; None: see the statistics.
+        backend: the options.
+        transcription: the problem on its grid.
+        run: solves, between vectors of unknowns and rows.
     """
 
-    w: np.ndarray
-    cost: float
-    g: np.ndarray
-    lam_x: np.ndarray
-    lam_g: np.ndarray
-    stats: dict[str, Any]
-    is_lost: bool = False
-    residual: float | None = None
-
-    @classmethod
-    def without_iterate(
-        cls, w0: np.ndarray, rows: int, stats: dict[str, Any], *, is_lost: bool = False
-    ) -> "NlpResult":
-        """Return the first iterate, for a run that has returned none."""
-        zeros = np.zeros(rows)
-        return cls(w0, np.inf, zeros, np.zeros_like(w0), zeros, stats, is_lost)
+    backend: NlpBackend
+    transcription: Transcription
+    run: NativeSolve
 
     @property
-    def success(self) -> bool:
-        """Whether the backend reports success."""
-        return bool(self.stats.get("success"))
+    def function(self) -> ca.Function:
+        """IPOPT for the same program, built where its derivatives are asked for: rarely."""
+        return self._ipopt.function
 
-    @property
-    def return_status(self) -> str:
-        """The backend's own name of how it ended."""
-        return str(self.stats.get("return_status", ""))
+    @cached_property
+    def _ipopt(self) -> Nlp:
+        return replace(self.backend, name="ipopt").build(self.transcription)
 
-    @property
-    def is_undefined(self) -> bool:
-        """Whether the backend met a number that is not finite."""
-        return not np.isfinite(self.cost) or self.return_status == "Invalid_Number_Detected"
+    def solve(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        bounds: dict[str, np.ndarray],
+        costate: np.ndarray | None = None,
+    ) -> NlpResult:
+        """Run the solver, see ``Nlp``."""
+        return self.run(w0, p, bounds, costate)
 
-    @property
-    def iterations(self) -> int:
-        """Number of iterations."""
-        return int(self.stats.get("iter_count", 0))
-
-    @property
-    def work(self) -> Work:
-        """Evaluations and factorisations."""
-        calls = [int(self.stats.get(f"n_call_nlp_{name}", 0)) for name in ("g", "jac_g")]
-        return Work(*calls, factorisations=self.iterations)
-
-    def history(self, name: str) -> np.ndarray:
-        """Return a quantity per iteration; empty where the backend records none."""
-        return np.array((self.stats.get("iterations") or {}).get(name, []))
+    def optimality(
+        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
+    ) -> OptimalityResidual:
+        """Return its own residual: it is not scaled."""
+        report: NativeReport = result.stats["report"]
+        return OptimalityResidual(report.dual, report.multiplier)
 
 
 def _clamped_values(transcription: TranscribedProblem) -> ca.Function:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp import Status, Work
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 
 
 class OtherStart(NamedTuple):
@@ -70,6 +70,10 @@ class NlpOutcome:
     def is_undefined(self) -> bool:
         """Whether a backend met a number that is not finite."""
         return any(result.is_undefined for result in self.results)
+
+    def told_by(self, words: str) -> "NlpOutcome":
+        """Return this outcome with something more in its message."""
+        return replace(self, message=f"{self.message}; {words}" if self.message else words)
 
     def after(self, earlier: "NlpOutcome") -> "NlpOutcome":
         """Return this outcome with the work of an earlier one."""

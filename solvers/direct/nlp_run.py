@@ -17,12 +17,15 @@ from ocp import Status
 from ocp.internal import RunData, start_violation
 from solvers.direct.curvature_check import has_negative_curvature
 from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
-from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_backends import Nlp
 from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
 from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved
 
+# What is said of an answer of IPOPT where the native solver was asked.
+_HANDED_OVER = "by IPOPT, since the native solver found no step or no end"
 # A least violation up to this counts as feasible: the elastic problem is solved to its tolerance.
 _FEASIBLE = 1e-5
 # Multipliers beyond this at a violation below that: the constraints' gradients depend on each
@@ -66,15 +69,22 @@ class NlpRun:
     state_error: Callable[[NlpResult, RunData], tuple[float, int]]
     feasibility_restoration: bool = True
 
-    def solve(self, w0: np.ndarray, data: RunData, others: Sequence[OtherStart] = ()) -> NlpOutcome:
+    def solve(
+        self,
+        w0: np.ndarray,
+        data: RunData,
+        others: Sequence[OtherStart] = (),
+        costate: np.ndarray | None = None,
+    ) -> NlpOutcome:
         """Solve for these data from a first iterate, which is clipped to the bounds.
 
         Args:
             w0: first iterate.
             data: of the run.
             others: first iterates to try before a failure is reported.
+            costate: of the first iterate, (N + 1, nx), where something is known of it.
         """
-        started, inputs = perf_counter(), self._inputs(w0, data)
+        started, inputs = perf_counter(), replace(self._inputs(w0, data), costate=costate)
         outcome = self._run_to_an_optimum(inputs)
         if self._may_be_infeasible(outcome):
             outcome = self.restore_feasibility(inputs, outcome)
@@ -85,8 +95,13 @@ class NlpRun:
     # -- the phases ------------------------------------------------------------------------------
 
     def first_solve(self, inputs: NlpInputs, nlp: Nlp) -> NlpOutcome:
-        """Run a backend from the first iterate, and again where only its scaling was met."""
+        """Run a backend from the first iterate, and again where only its scaling was met.
+
+        Where the native solver fails, which has no restoration of its own, IPOPT runs.
+        """
         outcome = self._run(nlp, inputs, inputs.w0)
+        if nlp.backend.name == "native" and self._is_handed_over(outcome):
+            return self.first_solve(inputs, self._ipopt).after(outcome).told_by(_HANDED_OVER)
         if outcome.status is Status.FAILED and outcome.last.success:
             outcome = self._run(nlp, inputs, outcome.last.w).after(outcome)
         return outcome
@@ -107,7 +122,7 @@ class NlpRun:
         if second.last.is_lost or is_unknown:
             message = f"from perturbed controls, {second.message}"
             return replace(first.after(second), status=Status.STATIONARY, message=message)
-        is_checked = nlp.backend.name == "ipopt" or second.status is not Status.SOLVED
+        is_checked = nlp.backend.name != "fatrop" or second.status is not Status.SOLVED
         if is_checked or not has_negative_curvature(nlp.function, second.last, inputs):
             return second.after(first)
         return self._run(self._ipopt, inputs, w).after(second.after(first))
@@ -215,11 +230,15 @@ class NlpRun:
             return first
         return self.solve_from_some_perturbed(inputs, first, chosen, hidden)
 
+    def _is_handed_over(self, outcome: NlpOutcome) -> bool:
+        """Whether a result of the native solver is none, and time is left."""
+        return outcome.status in _MAYBE_FIRST_ITERATE and not outcome.is_undefined
+
     def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome) -> bool:
         """Whether IPOPT failed close to the constraints, with multipliers without bound."""
         if outcome.status not in (Status.FAILED, Status.ITERATION_LIMIT):
             return False
-        last, is_ipopt = outcome.last, self.nlp.backend.name == "ipopt"
+        last, is_ipopt = outcome.last, self.nlp.backend.name != "fatrop"
         violation, _ = self.transcription.worst(last.w, last.g, inputs.bounds)
         unbounded = np.abs(last.lam_g).max(initial=0.0) > _UNBOUNDED
         return is_ipopt and bool(unbounded) and violation <= _CLOSE
@@ -259,11 +278,12 @@ class NlpRun:
     @cached_property
     def _for_dependent_rows(self) -> Nlp:
         """IPOPT for the same program, with a regularised linear system."""
-        return replace(self.nlp.backend, dependent_rows=True).build(self.transcription)
+        backend = replace(self.nlp.backend, name="ipopt", dependent_rows=True)
+        return backend.build(self.transcription)
 
     @cached_property
     def _ipopt(self) -> Nlp:
-        """IPOPT for the same program, built where fatrop's answer may be a saddle."""
+        """IPOPT for the same program, built where another's answer may be a saddle, or is none."""
         return replace(self.nlp.backend, name="ipopt").build(self.transcription)
 
     def _inputs(self, w0: np.ndarray, data: RunData) -> NlpInputs:
@@ -273,7 +293,8 @@ class NlpRun:
 
     def _run(self, nlp: Nlp, inputs: NlpInputs, w: np.ndarray) -> NlpOutcome:
         """Run a backend from an iterate."""
-        result = nlp.solve(w, inputs.p, inputs.bounds)
+        costate = inputs.costate if w is inputs.w0 else None
+        result = nlp.solve(w, inputs.p, inputs.bounds, costate)
         verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
         judged = verdict.judge(inputs, result)
         return NlpOutcome((judged.result,), judged.status, judged.message)

@@ -10,7 +10,8 @@ import numpy as np
 from ocp import Status
 from ocp.internal import ConstraintRow, RunData, Violation, start_violation
 from solvers.direct.fitted_multipliers import with_fitted_multipliers
-from solvers.direct.nlp_backends import Nlp, NlpResult
+from solvers.direct.nlp_backends import Nlp
+from solvers.direct.nlp_result import NlpResult
 from solvers.direct.optimality_residual import OptimalityCheck
 from solvers.direct.return_words import ACCEPTABLE, meaning
 from solvers.direct.transcribed_problem import TranscribedProblem
@@ -27,12 +28,21 @@ _DIVERGED = 1e15
 
 @dataclass(frozen=True, eq=False)
 class NlpInputs:
-    """The inputs of one solve: first iterate w0 within its bounds, p, bounds; ``data`` as given."""
+    """The inputs of one solve.
+
+    Attributes:
+        w0: first iterate within its bounds.
+        p: data of the program.
+        bounds: lbx, ubx, lbg, ubg.
+        data: as given.
+        costate: of the first iterate, (N + 1, nx), where something is known of it.
+    """
 
     w0: np.ndarray
     p: np.ndarray
     bounds: dict[str, np.ndarray]
     data: RunData
+    costate: np.ndarray | None = None
 
 
 class JudgedResult(NamedTuple):
@@ -80,7 +90,7 @@ class NlpVerdict:
             return JudgedResult(result, *self._judge_failure(result, where))
         if not result.success or result.return_status == ACCEPTABLE:
             return self._judge_unfinished(inputs, result)
-        residual = self._residual(result, inputs.p, inputs.bounds)
+        residual = self.nlp.optimality(result, inputs.p, inputs.bounds)
         if residual.is_stationary(_NOT_STATIONARY):
             return JudgedResult(result, *self._judge_solution(inputs, result, ""))
         said = f"{residual.gradient:.2g}, with multipliers up to {residual.multiplier:.2g}"

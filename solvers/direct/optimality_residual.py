@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.internal import BufferedFunction
-from solvers.direct.nlp_backends import NlpResult
+from solvers.direct.nlp_result import NlpResult
 
 # Values that agree to this are the same: unknowns are clipped to their bounds.
 _SAME = 1e-6

@@ -64,6 +64,18 @@ _WORDS: dict[tuple[str, str], ReturnWord] = {
         Status.FAILED, "a derivative of cost, dynamics or constraints is not finite"
     ),
     ("ipopt", "Insufficient_Memory"): ReturnWord(Status.FAILED, "memory does not suffice"),
+    ("native", "solved"): ReturnWord(Status.SOLVED, ""),
+    ("native", "iteration limit"): ReturnWord(
+        Status.ITERATION_LIMIT, "its iteration limit was reached"
+    ),
+    ("native", "no step"): ReturnWord(Status.FAILED, "no step was accepted"),
+    ("native", "not finite"): ReturnWord(
+        Status.FAILED, "a value or derivative of cost, dynamics or constraints is not finite"
+    ),
+    ("native", "time limit"): ReturnWord(Status.TIME_LIMIT, "its time limit was reached"),
+    ("native", "diverged"): ReturnWord(
+        Status.DIVERGED, "its iterates grow without bound: the cost may be unbounded below"
+    ),
     ("fatrop", "0"): ReturnWord(Status.SOLVED, ""),
     ("fatrop", "1"): ReturnWord(
         Status.FAILED, f"no step was accepted, or the iteration limit was reached: {_SINGULAR}"

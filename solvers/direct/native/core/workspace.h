@@ -1,0 +1,171 @@
+/* The memory of one problem: everything that a solve reads and writes, laid out in a block that the
+ * caller owns. There is no other memory, and no static data that changes.
+ *
+ * What the generated part has to define before this file:
+ *
+ *   NX, NU, NW     states and controls of a node, and NW = NU + NX; a node is w = (u, x)
+ *   NB             number of entries of w that may have a bound; bounded[NB]: which
+ *   NC, NI, NE     rows of every stage, rows of the start alone, rows of the end
+ *   ND             data of a node (times and parameters)
+ *
+ * and functions of arrays of lanes (see lanes.h), which take their arguments one after the other and
+ * return their values so; x is (NX), u (NU), d (ND), lambda (NX), y as many as rows, and matrices
+ * are stored row by row:
+ *
+ *   stage_value(x, u, d)                next state F, cost l, rows c
+ *   stage_full(x, u, d, lambda, y)      F, l, c, F_w, l_w, c_w, (l + lambda'F + y'c)_ww
+ *   stage_slope(x, u, d, lambda, y)     the same without the last
+ *   start_value(x, d), start_full(x, d, y)   c   |   c, c_w, (y'c)_ww
+ *   end_value(x, d), end_full(x, d, y)       l, c   |   l, c, l_w, c_w, (l + y'c)_ww
+ */
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+#include <time.h>
+
+#define AT_LEAST_1(n) ((n) > 0 ? (n) : 1)
+
+/* Pairs that a filter remembers; beyond, the oldest is forgotten. */
+#define FILTER 64
+/* Iterations of which something is noted. */
+#define NOTED 512
+
+typedef struct {
+  double tolerance;     /* of the optimality conditions */
+  double barrier;       /* first barrier parameter */
+  double max_iterations;
+  double time_limit;    /* [s] */
+  double pause;         /* after so long solve() returns PAUSED, to be called again [s] */
+  double warm;          /* whether the costates are a guess of value */
+  double monotone;      /* whether the barrier parameter only falls, from the beginning */
+} Options;
+
+typedef enum {
+  SOLVED = 0,
+  ITERATION_LIMIT = 1,
+  NO_STEP = 2,
+  NOT_FINITE = 3,
+  TIME_LIMIT = 4,
+  DIVERGED = 5,
+  PAUSED = 6
+} Ending;
+
+/* What is noted of an iteration: the residuals before it, and the step. */
+typedef struct {
+  double cost, primal, dual, product, mu, shift, length;
+} Note;
+
+/* What the optimality conditions leave, largest entries. */
+typedef struct {
+  double dual;         /* gradient of the Lagrangian, among what is free */
+  double primal;       /* gaps, rows, slacks */
+  double product;      /* slack times multiplier, minus the barrier parameter */
+  double mean_product; /* mean of slack times multiplier */
+  double multiplier;   /* largest multiplier */
+  double scale;        /* what the gradient is measured in: IPOPT's s_d */
+} Residuals;
+
+typedef struct {
+  int n;    /* intervals N */
+  int rows; /* length of all flat arrays over constrained quantities */
+
+  /* Iterate: nodes one after the other. */
+  double *x, *u, *lambda;
+  /* Flat, one entry for each constrained quantity: slacks and multipliers of the lower and the
+   * upper side, multiplier of an equation. */
+  double *s_low, *z_low, *s_up, *z_up, *y;
+
+  /* Data: of the nodes; bounds, and 1.0 where a quantity has that side or is an equation. */
+  double *data, *low, *up, *has_low, *has_up, *is_equation;
+  /* 1.0 where an entry of u, or of x_0, is given and not an unknown. */
+  double *u_given, *x_given;
+  double sides; /* number of slacks */
+
+  /* Step. */
+  double *dx, *du, *dlambda, *ds_low, *dz_low, *ds_up, *dz_up, *dy;
+  /* A correction of the step (refinement). */
+  double *ex, *eu, *elambda, *ey;
+  /* Trial iterate. */
+  double *x_trial, *u_trial, *gap_trial, *v_trial;
+
+  /* Values and derivatives at the iterate. */
+  double cost, cost_trial;
+  double *gap;       /* F(w_k) - x_{k+1} */
+  double *v;         /* constrained quantities */
+  double *slope;     /* F_w, [n][NX][NW] */
+  double *gradient;  /* of the cost l, [n + 1][NW] */
+  double *hessian;   /* of the Lagrangian, [n + 1][NW][NW] */
+  double *c_slope;   /* of the rows, one [NW] a row, in the order of the rows */
+
+  /* Condensed system: weights and right-hand side. */
+  double *r_low, *r_up, *r_y, *corr_low, *corr_up, *sigma, *force, *dv;
+  double *rhs; /* [n + 1][NW] */
+
+  /* Factor. */
+  double *P, *K, *L, *closed; /* [n + 1][NX][NX], [n][NU][NX], [n][NU][NU], [n][NX][NX] */
+  double *pivot;              /* [n][NU] */
+  double *p, *kappa;          /* [n + 1][NX], [n][NU] */
+  double start_factor[NX][NX], start_pivot[NX];
+
+  /* Course of the iteration. */
+  Residuals left;
+  double mu, shift, last_shift, length, largest_theta;
+  int iteration, is_monotone, short_steps, factorisations, evaluations, values;
+  int filter_size;
+  double filter_theta[FILTER], filter_phi[FILTER];
+  double seconds; /* used so far */
+  Note notes[NOTED];
+} Workspace;
+
+/* Where the constrained quantities of node k begin in the flat arrays. */
+static int rows_begin(int k) { return k == 0 ? 0 : NI + k * (NB + NC); }
+
+/* Rows (not bounds) of node k. */
+static int rows_of(const Workspace *s, int k) { return k == s->n ? NE : k == 0 ? NC + NI : NC; }
+
+/* Derivative of the first row of node k. */
+static double *slopes_of_rows(const Workspace *s, int k) {
+  return s->c_slope + (size_t)(k == 0 ? 0 : NI + k * NC) * NW;
+}
+
+/* Take `count` doubles, aligned to a cache line, from the block. */
+static double *take(char **at, size_t count) {
+  double *taken = (double *)*at;
+  *at += (count * sizeof(double) + 63) / 64 * 64;
+  return taken;
+}
+
+/* Lay the arrays out for n intervals; return the end. With `s` in front of the block. */
+static char *lay_out(Workspace *s, char *at, int n) {
+  const size_t m = (size_t)n + 1;
+  s->n = n;
+  s->rows = rows_begin(n) + NB + NE;
+  double **states[] = {&s->x,  &s->lambda,  &s->dx,      &s->dlambda,
+                       &s->ex, &s->elambda, &s->x_trial, &s->p};
+  double **controls[] = {&s->u, &s->du, &s->eu, &s->u_trial, &s->kappa, &s->pivot, &s->u_given};
+  double **flat[] = {&s->s_low,  &s->z_low,    &s->s_up,   &s->z_up,    &s->y,     &s->low,
+                     &s->up,     &s->has_low,  &s->has_up, &s->is_equation, &s->ds_low, &s->dz_low,
+                     &s->ds_up,  &s->dz_up,    &s->dy,     &s->ey,      &s->v,     &s->v_trial,
+                     &s->r_low,  &s->r_up,     &s->r_y,    &s->corr_low, &s->corr_up, &s->sigma,
+                     &s->force,  &s->dv};
+  for (size_t i = 0; i < sizeof states / sizeof *states; i++) *states[i] = take(&at, m * NX);
+  for (size_t i = 0; i < sizeof controls / sizeof *controls; i++)
+    *controls[i] = take(&at, m * AT_LEAST_1(NU));
+  for (size_t i = 0; i < sizeof flat / sizeof *flat; i++)
+    *flat[i] = take(&at, (size_t)AT_LEAST_1(s->rows));
+  s->x_given = take(&at, NX);
+  s->data = take(&at, m * ND);
+  s->gap = take(&at, m * NX);
+  s->gap_trial = take(&at, m * NX);
+  s->slope = take(&at, m * NX * NW);
+  s->gradient = take(&at, m * NW);
+  s->rhs = take(&at, m * NW);
+  s->hessian = take(&at, m * NW * NW);
+  s->c_slope = take(&at, ((size_t)NI + m * NC + NE + 1) * NW);
+  s->P = take(&at, m * NX * NX);
+  s->K = take(&at, m * AT_LEAST_1(NU) * NX);
+  s->L = take(&at, m * AT_LEAST_1(NU) * AT_LEAST_1(NU));
+  s->closed = take(&at, m * NX * NX);
+  return at;
+}

@@ -1,0 +1,129 @@
+"""CasADi Functions as C on lanes: straight-line code, one assignment an operation."""
+
+from collections.abc import Iterable, Iterator
+from itertools import accumulate
+
+import casadi as ca
+
+from ocp import UnsupportedProblem
+
+# What C writes as an operator.
+_OPERATORS = {
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "{0} + {0}",
+    ca.OP_INV: "ALL(1.0) / {0}",
+    ca.OP_LT: "NUMBER({0} < {1})",
+    ca.OP_LE: "NUMBER({0} <= {1})",
+    ca.OP_EQ: "NUMBER({0} == {1})",
+    ca.OP_NE: "NUMBER({0} != {1})",
+    ca.OP_NOT: "NUMBER({0} == ALL(0.0))",
+    ca.OP_AND: "NUMBER({0} != ALL(0.0)) * NUMBER({1} != ALL(0.0))",
+    ca.OP_OR: "NUMBER(NUMBER({0} != ALL(0.0)) + NUMBER({1} != ALL(0.0)) > ALL(0.0))",
+    ca.OP_CONSTPOW: "lanes_pow({0}, {1})",
+}
+# What is a function of ``lanes.h`` of the same name.
+_UNARY = "exp log sqrt sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh erf log1p expm1"
+_OTHERS = "floor ceil fabs sign pow fmod remainder copysign fmin fmax atan2 hypot if_else_zero"
+_OPERATORS |= {
+    getattr(ca, f"OP_{name.upper()}"): f"lanes_{name}({{0}}, {{1}})"
+    if name in ("pow", "fmod", "remainder", "copysign", "fmin", "fmax", "atan2", "hypot")
+    or name == "if_else_zero"
+    else f"lanes_{name}({{0}})"
+    for name in f"{_UNARY} {_OTHERS}".split()
+}
+
+
+def lane_code(functions: Iterable[ca.Function], problem: str) -> str:
+    """Return the C of some functions of SX, and of those that they call.
+
+    Each becomes ``static void name(const V *in, V *out)``, with its arguments one after the other,
+    and its values, column by column.
+
+    Args:
+        functions: dense ones, of different names.
+        problem: whose they are, for messages.
+
+    Raises:
+        UnsupportedProblem: for an operation without C, or a call of what is no function of SX.
+    """
+    written: dict[str, str] = {}
+    for function in functions:
+        _write(function, problem, written)
+    return "\n".join(written.values())
+
+
+def _write(function: ca.Function, problem: str, written: dict[str, str]) -> None:
+    """Write a function after those that it calls, each once."""
+    if not function.is_a("SXFunction"):
+        raise UnsupportedProblem(
+            f"{problem}: the native backend cannot write the call of '{function.name()}' as C; "
+            "write it with CasADi's operations, or take backend='ipopt'"
+        )
+    called = [function.get_function(name) for name in function.get_function()]
+    for each in called:
+        if each.name() not in written:
+            _write(each, problem, written)
+    body = "\n".join(f"  {line}" for line in _lines(function, called, problem))
+    names = ", ".join(f"a{i}" for i in range(max(1, function.sz_w())))
+    head = f"static void {function.name()}(const V *in, V *out) {{"
+    written[function.name()] = f"{head}\n  V {names};\n{body}\n}}\n"
+
+
+def _lines(function: ca.Function, called: list[ca.Function], problem: str) -> Iterator[str]:
+    """Yield one statement an instruction."""
+    arguments = _begins(function.nnz_in(i) for i in range(function.n_in()))
+    values = _begins(function.nnz_out(i) for i in range(function.n_out()))
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        given, made = function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_INPUT:
+            yield f"a{made[0]} = in[{arguments[given[0]] + given[1]}];"
+        elif operation == ca.OP_OUTPUT:
+            yield f"out[{values[made[0]] + made[1]}] = a{given[0]};"
+        elif operation == ca.OP_CONST:
+            yield f"a{made[0]} = ALL({_number(function.instruction_constant(k))});"
+        elif operation == ca.OP_CALL:
+            yield _call(_which(called, len(given), len(made)), given, made)
+        elif operation in _OPERATORS:
+            names = [f"a{i}" for i in given]
+            yield f"a{made[0]} = {_OPERATORS[operation].format(*names)};"
+        else:
+            raise UnsupportedProblem(
+                f"{problem}: the native backend cannot write CasADi's operation number {operation} "
+                "as C; write it otherwise, or take backend='ipopt'"
+            )
+
+
+def _call(name: str, given: list[int], made: list[int]) -> str:
+    arguments = ", ".join(f"a{i}" for i in given)
+    # An output that nobody uses has no place.
+    kept = " ".join(f"a{i} = y[{j}];" for j, i in enumerate(made) if i >= 0)
+    return f"{{ const V x[] = {{{arguments}}}; V y[{len(made)}]; {name}(x, y); {kept} }}"
+
+
+def _which(called: list[ca.Function], given: int, made: int) -> str:
+    """Return the name of the function that takes and returns so many numbers."""
+    fitting = [f.name() for f in called if f.nnz_in() == given and f.nnz_out() == made]
+    if len(fitting) != 1:
+        raise UnsupportedProblem(
+            f"the native backend cannot tell which function is called with {given} numbers"
+        )
+    return fitting[0]
+
+
+def _begins(counts: Iterable[int]) -> list[int]:
+    return [0, *accumulate(counts)]
+
+
+def _number(value: float) -> str:
+    if value != value:
+        return "NAN"
+    if abs(value) == float("inf"):
+        return "INFINITY" if value > 0 else "-INFINITY"
+    return repr(float(value))

@@ -1,0 +1,206 @@
+"""The compiled native solver in this process, and its memory as arrays."""
+
+import ctypes
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ocp import Compiler, UnsupportedProblem
+from ocp.internal import Unbuildable, built_library
+from solvers.direct.native.stage_code import StageCode
+
+_LINE = 64  # bytes that memory is aligned to
+_REPORT = 12  # numbers of ``native_report``
+_PAUSED = 6  # of ``Ending``
+_NOTED = 512  # iterations of which something is noted
+#: What is noted of an iteration.
+NOTE = ("cost", "primal", "dual", "product", "barrier", "shift", "length")
+
+
+class NativeArrays(NamedTuple):
+    """The memory that Python writes and reads, as views; see ``workspace.h``."""
+
+    x: np.ndarray
+    u: np.ndarray
+    costate: np.ndarray
+    data: np.ndarray
+    low: np.ndarray
+    up: np.ndarray
+    v: np.ndarray
+    z_low: np.ndarray
+    z_up: np.ndarray
+    y: np.ndarray
+    x_given: np.ndarray
+    u_given: np.ndarray
+    has_low: np.ndarray
+    has_up: np.ndarray
+    is_equation: np.ndarray
+    gap: np.ndarray
+    slope: np.ndarray
+    gradient: np.ndarray
+    hessian: np.ndarray
+    c_slope: np.ndarray
+    sigma: np.ndarray
+    rhs: np.ndarray
+    dx: np.ndarray
+    du: np.ndarray
+    dcostate: np.ndarray
+
+
+class NativeReport(NamedTuple):
+    """What a solve has come to, by its own account.
+
+    Attributes:
+        cost: at the iterate.
+        dual: largest entry of the Lagrangian's gradient.
+        primal: largest gap or violation, slacks included.
+        product: largest slack times multiplier.
+        multiplier: the largest.
+        iterations: steps that were accepted.
+        factorisations: of the condensed system.
+        evaluations: of all derivatives.
+        values: evaluations of values alone.
+        is_monotone: whether the barrier parameter has become so.
+        shift: of the last Hessian.
+        barrier: the last barrier parameter.
+    """
+
+    cost: float
+    dual: float
+    primal: float
+    product: float
+    multiplier: float
+    iterations: float
+    factorisations: float
+    evaluations: float
+    values: float
+    is_monotone: float
+    shift: float
+    barrier: float
+
+
+class NativeOptions(ctypes.Structure):
+    """``Options`` of ``workspace.h``."""
+
+    _fields_ = (
+        ("tolerance", ctypes.c_double),
+        ("barrier", ctypes.c_double),
+        ("max_iterations", ctypes.c_double),
+        ("time_limit", ctypes.c_double),
+        ("pause", ctypes.c_double),
+        ("warm", ctypes.c_double),
+        ("monotone", ctypes.c_double),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class NativeLibrary:
+    """The native solver of one problem, with memory for one solve at a time.
+
+    Attributes:
+        code: what was compiled.
+        library: the machine code.
+    """
+
+    code: StageCode
+    library: ctypes.CDLL
+
+    @classmethod
+    def of(cls, code: StageCode, compiler: Compiler | None = None) -> "NativeLibrary":
+        """Compile and load it, or load it from the cache.
+
+        Raises:
+            UnsupportedProblem: where there is no compiler, or it fails.
+        """
+        try:
+            path = built_library(code.code, compiler or Compiler())
+        except Unbuildable as reason:
+            raise UnsupportedProblem(
+                f"{code.transcription.ocp.name}: the native backend needs a C compiler, and "
+                f"{reason}; install one (gcc or clang), or take backend='ipopt'"
+            ) from reason
+        library = ctypes.CDLL(str(path))
+        library.native_bytes.restype = ctypes.c_size_t
+        library.native_evaluate.restype = ctypes.c_double
+        library.native_linear_step.argtypes = [ctypes.c_void_p, ctypes.c_double]
+        return cls(code, library)
+
+    def solve(self, options: NativeOptions) -> int:
+        """Solve from what is in the arrays; return how it ended, an ``Ending``.
+
+        Between pauses Python handles its signals, so that Ctrl-C ends it.
+        """
+        ending, begin = _PAUSED, 1
+        while ending == _PAUSED:
+            ending = self.library.native_solve(self._block, ctypes.byref(options), begin)
+            begin = 0
+        return ending
+
+    def read_bounds(self) -> None:
+        """Take over what is in ``low``, ``up``, ``x_given`` and ``u_given``."""
+        self.library.native_read_bounds(self._block)
+
+    def report(self) -> NativeReport:
+        """Return what the last solve has come to."""
+        numbers = (ctypes.c_double * _REPORT)()
+        self.library.native_report(self._block, numbers)
+        return NativeReport(*numbers)
+
+    def notes(self) -> np.ndarray:
+        """Return what is noted of the iterations, one row each, in the order of ``Note``."""
+        notes = np.empty((_NOTED, len(NOTE)))
+        pointer = notes.ctypes.data_as(ctypes.c_void_p)
+        return notes[: self.library.native_notes(self._block, pointer)]
+
+    def lagrangian_gradient(self) -> np.ndarray:
+        """Return what multipliers of given unknowns balance, (N + 1, nu + nx) in (u, x)."""
+        self.library.native_gradient(self._block)
+        return self.arrays.rhs
+
+    def linear_step(self, shift: float) -> bool:
+        """Solve the condensed system of what is in the arrays; return whether it is convex."""
+        return bool(self.library.native_linear_step(self._block, shift))
+
+    def evaluate(self) -> float:
+        """Evaluate everything at what is in the arrays; return the cost."""
+        return float(self.library.native_evaluate(self._block))
+
+    @cached_property
+    def _memory(self) -> np.ndarray:
+        n = self.code.transcription.n
+        return np.zeros(self.library.native_bytes(n) + _LINE, dtype=np.uint8)
+
+    @cached_property
+    def _block(self) -> ctypes.c_void_p:
+        """The memory, laid out."""
+        address = self._memory.ctypes.data
+        block = ctypes.c_void_p(address + -address % _LINE)
+        self.library.native_set_up(block, self.code.transcription.n)
+        return block
+
+    @cached_property
+    def arrays(self) -> NativeArrays:
+        """The arrays in the memory."""
+        code, m = self.code, self.code.transcription.n + 1
+        nx, nu, rows = code.nx, code.nu, code.flat_size
+        nw, total = nx + nu, code.row_total
+        states, controls, nodes = (m, nx), (m - 1, nu), (m, nw)
+        shapes = {name: (rows,) for name in NativeArrays._fields}
+        shapes |= dict.fromkeys(("x", "costate", "dx", "dcostate"), states)
+        shapes |= dict.fromkeys(("u", "u_given", "du"), controls)
+        shapes |= dict.fromkeys(("gradient", "rhs"), nodes)
+        shapes |= {"data": (m, code.nd), "x_given": (nx,), "gap": (m - 1, nx)}
+        shapes |= {"slope": (m - 1, nx, nw), "hessian": (m, nw, nw), "c_slope": (total, nw)}
+        pointers = (ctypes.POINTER(ctypes.c_double) * len(shapes))()
+        self.library.native_arrays(self._block, pointers)
+        return NativeArrays(*map(_view, pointers, shapes.values()))
+
+
+def _view(pointer: "ctypes._Pointer[ctypes.c_double]", shape: tuple[int, ...]) -> np.ndarray:
+    """Return memory as an array; it lives as long as the library that owns it."""
+    size = int(np.prod(shape))
+    if not size:
+        return np.zeros(shape)
+    return np.ctypeslib.as_array(pointer, (size,)).reshape(shape)

@@ -1,0 +1,135 @@
+"""``NativeSolve``: the native solver between vectors of unknowns and rows of the program."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from solvers.direct.native.flat_rows import FlatRows
+from solvers.direct.native.native_library import NOTE, NativeLibrary, NativeOptions, NativeReport
+from solvers.direct.nlp_result import NlpResult
+
+# First barrier parameter, and that of a start with costates.
+_COLD, _WARM = 0.1, 1e-4
+# How long a solve may take before Python looks for signals [s].
+_PAUSE = 0.1
+# What ``Ending`` of ``workspace.h`` means, in words that ``return_words`` explains.
+ENDINGS = (
+    "solved",
+    "iteration limit",
+    "no step",
+    "not finite",
+    "time limit",
+    "diverged",
+)
+
+
+# After these no other way to iterate is tried from the same first iterate.
+_FINAL = ("solved", "time limit")
+
+
+@dataclass(frozen=True, eq=False)
+class NativeLimits:
+    """The options of a backend that the native solver knows.
+
+    Attributes:
+        tolerance: of the optimality conditions.
+        max_iterations: limit.
+        time_limit: for one run [s].
+    """
+
+    tolerance: float
+    max_iterations: int
+    time_limit: float
+
+    def at(self, *, warm: bool, monotone: bool = False) -> NativeOptions:
+        """Return them as the library takes them."""
+        return NativeOptions(
+            tolerance=self.tolerance,
+            barrier=_WARM if warm else _COLD,
+            max_iterations=float(self.max_iterations),
+            time_limit=self.time_limit,
+            pause=_PAUSE,
+            warm=float(warm),
+            monotone=float(monotone),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class NativeSolve:
+    """The native solver for one transcribed problem, between vectors of unknowns and rows.
+
+    Attributes:
+        library: compiled, with its memory.
+        limits: of every run.
+    """
+
+    library: NativeLibrary
+    limits: NativeLimits
+
+    def __call__(
+        self,
+        w0: np.ndarray,
+        p: np.ndarray,
+        bounds: dict[str, np.ndarray],
+        costate: np.ndarray | None,
+    ) -> NlpResult:
+        """Run it; return the first iterate where its result is not finite.
+
+        Args:
+            w0: first iterate.
+            p: data of the problem, see ``Transcription.data_vector``.
+            bounds: lbx, ubx, lbg, ubg.
+            costate: of the first iterate, (N + 1, nx); None: it is a cold start.
+        """
+        library, at, tr = self.library, self.library.arrays, self.library.code.transcription
+        at.data[:] = library.code.data(p)
+        self._rows.put_bounds(at, bounds)
+        library.read_bounds()
+        stats: dict[str, Any] = {}
+        for warm, monotone in ((True, False), (False, False), (False, True)):
+            if warm and costate is None:
+                continue
+            at.x[:], at.u[:] = tr.split(w0)
+            if warm and costate is not None:
+                at.costate[:] = 0.0
+                at.costate[:, : costate.shape[1]] = costate
+            ending = ENDINGS[library.solve(self.limits.at(warm=warm, monotone=monotone))]
+            stats = _stats(ending, library.report(), library.notes(), stats)
+            if ending in _FINAL:
+                break
+        if not np.isfinite(library.report().cost) or not np.isfinite(at.x).all():
+            return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
+        return self._result(bounds, stats)
+
+    def _result(self, bounds: dict[str, np.ndarray], stats: dict[str, Any]) -> NlpResult:
+        at, rows, tr = self.library.arrays, self._rows, self.library.code.transcription
+        gradient = self.library.lagrangian_gradient()
+        w = np.clip(tr.join(at.x, at.u), bounds["lbx"], bounds["ubx"])
+        lam_x, g, lam_g = rows.multipliers_of_bounds(at, gradient), rows.values(at), rows.lam_g(at)
+        return NlpResult(w, self.library.report().cost, g, lam_x, lam_g, stats)
+
+    @cached_property
+    def _rows(self) -> FlatRows:
+        return FlatRows.of(self.library.code)
+
+
+def _stats(
+    word: str, report: NativeReport, notes: np.ndarray, before: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the statistics of a run as ``NlpResult`` reads them, with the work of those before."""
+    work = {
+        "iter_count": int(report.iterations),
+        "n_call_nlp_g": int(report.values + report.evaluations),
+        "n_call_nlp_jac_g": int(report.evaluations),
+    }
+    by_name = dict(zip(NOTE, notes.T.copy(), strict=True))
+    named = {"obj": by_name["cost"], "inf_pr": by_name["primal"], "inf_du": by_name["dual"]}
+    return {
+        "return_status": word,
+        "success": word == ENDINGS[0],
+        **{name: count + before.get(name, 0) for name, count in work.items()},
+        "iterations": by_name | named,
+        "report": report,
+    }

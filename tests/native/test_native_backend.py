@@ -1,0 +1,108 @@
+"""The native backend of multiple shooting against IPOPT on the same program, and its failures."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ocp import OCP, Guess, Status, UnsupportedProblem, evaluate, solve
+from ocp.codegen.compile import Compiler
+from ocp.internal import Transcription
+from solvers import MultipleShooting
+from solvers.direct.native.native_library import NativeLibrary
+from solvers.direct.native.stage_code import StageCode
+from tests.native.problems import (
+    designed,
+    free_time,
+    held_still,
+    impossible,
+    swing,
+    unbounded,
+)
+
+NATIVE = MultipleShooting(20, backend="native")
+IPOPT = MultipleShooting(20)
+# Two interior points on the same program: each stops where its own barrier is 1e-9 or less.
+SAME_OPTIMUM = 1e-8
+SAME_COSTATE = 1e-5
+
+
+@pytest.mark.parametrize("make", [swing, free_time, designed, held_still])
+def test_it_finds_the_optimum_of_ipopt(make) -> None:
+    ocp = make()
+    native, ipopt = solve(ocp, NATIVE).or_raise(), solve(ocp, IPOPT).or_raise()
+    assert "IPOPT" not in native.message
+    assert native.cost == pytest.approx(ipopt.cost, rel=SAME_OPTIMUM, abs=SAME_OPTIMUM)
+    np.testing.assert_allclose(native.x, ipopt.x, atol=1e-4)
+    scale = 1.0 + np.abs(ipopt.costate).max()
+    np.testing.assert_allclose(native.costate, ipopt.costate, atol=SAME_COSTATE * scale)
+    found, known = evaluate(native).violation, evaluate(ipopt).violation
+    assert found == pytest.approx(known, abs=1e-5)  # of both between the nodes
+
+
+def test_parameters_start_and_time_are_those_of_the_run() -> None:
+    ocp = swing()
+    given = {"parameters": {"stiffness": 0.7, "wind": [0.1, 0.2, -0.1, 0.3]}, "t0": 0.4}
+    native, ipopt = (s.build(ocp).run(x0=[0.5, 0.2], **given) for s in (NATIVE, IPOPT))
+    assert native.or_raise().cost == pytest.approx(ipopt.or_raise().cost, rel=SAME_OPTIMUM)
+
+
+def test_a_warm_start_takes_fewer_iterations() -> None:
+    program = NATIVE.build(swing())
+    cold = program.run().or_raise()
+    warm = program.run(guess=cold).or_raise()
+    assert warm.cost == pytest.approx(cold.cost, rel=SAME_OPTIMUM)
+    assert warm.iterations < cold.iterations
+
+
+def test_an_infeasible_problem_is_called_so() -> None:
+    solution = solve(impossible(), NATIVE)
+    assert solution.status is Status.INFEASIBLE
+    assert "goal" in solution.message
+
+
+def test_no_minimum_is_no_success() -> None:
+    assert solve(unbounded(), NATIVE).status is Status.DIVERGED
+
+
+def test_after_a_failure_the_next_run_is_as_the_first() -> None:
+    program = replace(NATIVE, feasibility_restoration=False).build(swing())
+    first = program.run().or_raise()
+    failed = program.run(parameters={"stiffness": 1e6})
+    assert not failed.status.is_success
+    again = program.run()
+    np.testing.assert_array_equal(again.x, first.x)
+    assert again.iterations == first.iterations
+
+
+def test_a_guess_far_away_is_no_success_of_something_else() -> None:
+    guess = Guess(x=np.full((21, 2), 1e8), u=np.full((20, 2), -1e8))
+    solution = solve(swing(), NATIVE, guess=guess)
+    assert not solution.status.is_success or solution.cost == pytest.approx(
+        solve(swing(), IPOPT).cost, rel=1e-6
+    )
+
+
+def test_a_time_limit_ends_it() -> None:
+    ocp = swing()
+    solution = solve(ocp, replace(NATIVE, time_limit=1e-9, feasibility_restoration=False))
+    assert solution.status is Status.TIME_LIMIT
+    assert np.isfinite(solution.x).all()
+
+
+def test_an_iteration_limit_ends_it() -> None:
+    limited = replace(NATIVE, max_iterations=2, feasibility_restoration=False)
+    assert solve(swing(), limited).status is Status.ITERATION_LIMIT
+
+
+def test_without_a_compiler_there_is_a_named_error() -> None:
+    code = StageCode(Transcription(swing(), 7, NATIVE.integrator))
+    with pytest.raises(UnsupportedProblem, match="swing: the native backend needs a C compiler"):
+        NativeLibrary.of(code, Compiler(command="no-such-compiler"))
+
+
+def test_the_optimum_costs_the_same_in_machine_code_of_another_horizon() -> None:
+    ocp: OCP = free_time()
+    for n in (5, 40):
+        native, ipopt = (solve(ocp, replace(s, intervals=n)) for s in (NATIVE, IPOPT))
+        assert native.or_raise().cost == pytest.approx(ipopt.or_raise().cost, rel=SAME_OPTIMUM)
