@@ -124,7 +124,7 @@ def _along(ocp: OCP, truth: ReferenceTrajectory, estimated: Estimated) -> np.nda
 def _readings(ocp: OCP, estimated: Estimated) -> ca.Function:
     """Return (x, t, p) -> what is measured, and its derivatives in x and in what was chosen."""
     m, p = ocp.model, ocp.p
-    h = ca.vertcat(*[each.expression for each in ocp.data])
+    h = ocp.functions.measured(m.x, m.t, p)
     in_theta = ca.jacobian(h, p)[:, estimated.in_p]
     in_theta = ca.horzcat(in_theta, ca.SX(h.numel(), len(estimated.starts)))
     outputs = [ca.densify(each) for each in (h, ca.jacobian(h, m.x), in_theta)]

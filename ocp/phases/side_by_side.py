@@ -14,7 +14,7 @@ phases.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -27,7 +27,7 @@ from ocp.phases.link import LinkRows
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import Parameter, ParameterValues, Signal, Unknown
+from ocp.problem.parameters import Parameter, ParameterValues, Signal, Steps, Unknown
 from ocp.problem.portable import Portable
 from ocp.problem.scaled import sizes_of
 
@@ -154,7 +154,7 @@ class _Fresh:
     new: ca.SX
     x: ca.SX
     u: ca.SX
-    parameters: tuple[Parameter | Signal, ...]
+    parameters: tuple[Parameter | Signal | Steps, ...]
 
     @classmethod
     def of(cls, chain: Chain, lane: Lane, clock: ca.SX) -> "_Fresh":
@@ -169,11 +169,7 @@ class _Fresh:
                 symbols.append(unknown.symbol)
                 continue
             symbols.append(ca.SX.sym(lane.named(entry.name), entry.symbol.numel()))
-            if isinstance(entry, Signal):
-                given = (lane.named(entry.name), symbols[-1], entry.samples, entry.hold)
-                parameters.append(Signal(*given))
-            else:
-                parameters.append(Parameter(lane.named(entry.name), symbols[-1], entry.value))
+            parameters.append(replace(entry, name=lane.named(entry.name), symbol=symbols[-1]))
         old, new = ca.vertcat(m.x, m.u, m.t, base.p), ca.vertcat(x, u, clock, *symbols)
         return cls(old, new, x, u, tuple(parameters))
 

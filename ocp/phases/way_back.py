@@ -33,6 +33,8 @@ def on_own_clocks(side: SideBySide, whole: Solution) -> Iterator[Solution]:
 def _of(
     side: SideBySide, lane: Lane, whole: Solution, t: np.ndarray, linked: np.ndarray
 ) -> Solution:
+    known = {entry.name for entry in lane.base.parameters}  # the last input is a state there
+    values = side.values(lane, {**whole.parameters, **whole.unknowns}).as_dict()
     x, x0 = whole.x[:, lane.x], whole.x0[lane.x].copy()
     x0[: len(linked)] = np.where(linked, x[0, : len(linked)], x0[: len(linked)])
     found = whole.with_(
@@ -45,7 +47,7 @@ def _of(
         u=whole.u[:, lane.u],
         cost=0.0,  # no method knows the share of a phase
         history={},
-        parameters=side.values(lane, {**whole.parameters, **whole.unknowns}).as_dict(),
+        parameters={name: value for name, value in values.items() if name in known},
         unknowns={},
         normal=None,
     )
