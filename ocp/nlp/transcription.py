@@ -91,13 +91,17 @@ class Transcription:
         stages = w[: -self.nz].reshape(self.n, -1)
         return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
 
-    @cached_property
+    @property
     def is_control(self) -> np.ndarray:
         """Which unknowns are controls, bool (size,)."""
+        return self._is_control
+
+    @cached_property
+    def _is_control(self) -> np.ndarray:
         z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
         return self.join(z, u).astype(bool)
 
-    @cached_property
+    @property
     def is_later_state(self) -> np.ndarray:
         """Which unknowns are states after the start, bool (size,)."""
         z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)

@@ -1,7 +1,7 @@
 """Direct collocation: the problem on Radau or Gauss points, by an interior-point method."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
@@ -196,7 +196,7 @@ class CollocationProgram(MethodProgram):
         def first(duration: float, source: FirstStates) -> np.ndarray:
             return self._first_iterate(data, guess, duration, source).joined()
 
-        others = tuple(other_starts(ocp, guess, duration, first))
+        others = partial(other_starts, ocp, guess, duration, first)
         outcome = self._nlp_run.solve(first(duration, "tame"), data, others)
         return self._result(data, outcome)
 

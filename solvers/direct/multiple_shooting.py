@@ -1,7 +1,7 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -163,7 +163,8 @@ class MultipleShootingProgram(MethodProgram):
         def first(duration: float, source: FirstStates) -> np.ndarray:
             return self.transcription.join(*self._iterate(data, guess, duration, source))
 
-        w0, others = first(duration, "tame"), tuple(other_starts(ocp, guess, duration, first))
+        others = partial(other_starts, ocp, guess, duration, first)
+        w0 = first(duration, "tame")
         outcome = self._nlp_run.solve(w0, data, others, self._costate(guess))
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
             outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
@@ -212,10 +213,11 @@ class MultipleShootingProgram(MethodProgram):
 
     def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
         """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""
-        nodes, nx = self.grid.fractions, self.ocp.model.nx
-        if self.solver.backend != "native" or guess is None or guess.sample("x", nodes, nx) is None:
+        nx, start = self.ocp.model.nx, np.zeros(1)
+        if self.solver.backend != "native" or guess is None:
             return None
-        return guess.sample("costate", nodes, nx)
+        costate = guess.sample("costate", self.grid.fractions, nx)
+        return None if costate is None or guess.sample("x", start, nx) is None else costate
 
     # -- the result ---------------------------------------------------------------------------
 

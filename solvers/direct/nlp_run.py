@@ -6,7 +6,7 @@ feasibility if it failed, and solve from there; solve from other first iterates.
 an ``NlpOutcome``.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -73,7 +73,7 @@ class NlpRun:
         self,
         w0: np.ndarray,
         data: RunData,
-        others: Sequence[OtherStart] = (),
+        others: Callable[[], Iterable[OtherStart]] = tuple,
         costate: np.ndarray | None = None,
     ) -> NlpOutcome:
         """Solve for these data from a first iterate, which is clipped to the bounds.
@@ -81,7 +81,7 @@ class NlpRun:
         Args:
             w0: first iterate.
             data: of the run.
-            others: first iterates to try before a failure is reported.
+            others: returns first iterates to try before a failure is reported.
             costate: of the first iterate, (N + 1, nx), where something is known of it.
         """
         started, inputs = perf_counter(), replace(self._inputs(w0, data), costate=costate)
@@ -89,7 +89,7 @@ class NlpRun:
         if self._may_be_infeasible(outcome):
             outcome = self.restore_feasibility(inputs, outcome)
         if self._may_start_elsewhere(outcome, data):
-            outcome = self.solve_from_others(inputs, outcome, others, started)
+            outcome = self.solve_from_others(inputs, outcome, others(), started)
         return outcome
 
     # -- the phases ------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ class NlpRun:
         return still & ~at_bounds(self.transcription, inputs, w)
 
     def solve_from_others(
-        self, first: NlpInputs, failed: NlpOutcome, others: Sequence[OtherStart], started: float
+        self, first: NlpInputs, failed: NlpOutcome, others: Iterable[OtherStart], started: float
     ) -> NlpOutcome:
         """Solve from other first iterates, until one succeeds or the time limit has passed."""
         tried: list[OtherStart] = []
@@ -231,8 +231,9 @@ class NlpRun:
         return self.solve_from_some_perturbed(inputs, first, chosen, hidden)
 
     def _is_handed_over(self, outcome: NlpOutcome) -> bool:
-        """Whether a result of the native solver is none, and time is left."""
-        return outcome.status in _MAYBE_FIRST_ITERATE and not outcome.is_undefined
+        """Whether the native solver has failed, not for lack of time nor at the first iterate."""
+        is_failure = outcome.status in _MAYBE_FIRST_ITERATE and not outcome.last.success
+        return is_failure and not outcome.is_undefined
 
     def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome) -> bool:
         """Whether IPOPT failed close to the constraints, with multipliers without bound."""

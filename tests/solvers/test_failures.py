@@ -36,7 +36,7 @@ from solvers import (
 )
 from tests.solvers.problems import changed, ends, mass, moving, point, tracker
 
-SHOOTING = (MultipleShooting(20), MultipleShooting(20, backend="fatrop"))
+SHOOTING = tuple(MultipleShooting(20, backend=b) for b in ("ipopt", "fatrop", "native"))
 DIRECT = (*SHOOTING, Collocation(10, 3), Collocation(10, 3, points="gauss"))
 ALL = (
     *DIRECT,
@@ -206,7 +206,7 @@ def test_more_terminal_equations_than_states() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop", "native"])
 def test_arm_034_cannot_keep_clear(backend) -> None:
     """The path of the end effector itself passes 0.106 m from the centre."""
     scenario = arm_scenario("arm-034")
@@ -226,13 +226,13 @@ def test_arm_034_cannot_keep_clear(backend) -> None:
 
 @direct
 def test_a_coarse_integrator_is_inaccurate(solver: Solver) -> None:
-    """RK4 with h = 1/20 is unstable on dx/dt = -100 x."""
+    """RK4 with h = 1/20 is unstable on dx/dt = -100 x: without control it ends at 5e22."""
     solution = solve(moving(lambda x, u: -100 * x + u, x0=1.0), solver)
     assert solution.status is Status.INACCURATE
-    assert re.fullmatch(r"a state moves by \S+ at t = \S+ s", solution.message)
+    assert re.fullmatch(r"a state moves by \S+ at t = \S+ s(; by IPOPT.*)?", solution.message)
 
 
-@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop", "native"])
 def test_iteration_limit_of_direct_methods(backend) -> None:
     solution = solve(
         arm_scenario("arm-001").ocp(), MultipleShooting(30, backend=backend, max_iterations=2)
@@ -314,7 +314,8 @@ def test_success_is_silent_too(solver: Solver) -> None:
 
 
 @pytest.mark.parametrize(
-    "solver", [MultipleShooting(40), MultipleShooting(40, backend="fatrop"), Collocation(20)]
+    "solver",
+    [*(MultipleShooting(40, backend=b) for b in ("ipopt", "fatrop", "native")), Collocation(20)],
 )
 def test_a_cost_that_is_tiny_at_the_start_hides_no_way(solver) -> None:
     """Beyond a hill the size of the cost is a million times larger: the end was INFEASIBLE."""

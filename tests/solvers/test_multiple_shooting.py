@@ -48,8 +48,8 @@ from tests.solvers.problems import (
 )
 from tests.tolerances import CERTIFIED, DIRECT_COST, MINIMISER, SAME_PROGRAM
 
-Backend = Literal["ipopt", "fatrop"]
-both = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+Backend = Literal["ipopt", "fatrop", "native"]
+both = pytest.mark.parametrize("backend", ["ipopt", "fatrop", "native"])
 
 
 def cornered() -> OCP:

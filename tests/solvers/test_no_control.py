@@ -43,6 +43,7 @@ LEAST = 1.0 / (math.e - 1.0) ** 2
 SOLVERS: tuple[Solver, ...] = (
     MultipleShooting(40),
     MultipleShooting(40, backend="fatrop"),
+    MultipleShooting(40, backend="native"),
     MultipleShooting(40, compiled=True),
     Collocation(8),
     Collocation(8, points="gauss"),

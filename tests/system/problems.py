@@ -62,6 +62,7 @@ EVERY: tuple[tuple[Solver, OCP], ...] = (
     (MultipleShooting(10), in_micrometres()),
     (MultipleShooting(10), with_a_kink()),
     (MultipleShooting(12, backend="fatrop"), pendulum()),
+    (MultipleShooting(12, backend="native"), pendulum()),
     (MultipleShooting(10, backend="fatrop", time_limit=20.0), cart()),
     (Collocation(5), cart()),
     (BetweenNodes(MultipleShooting(10)), cart()),

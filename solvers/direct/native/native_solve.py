@@ -99,7 +99,7 @@ class NativeSolve:
             stats = _stats(ending, library.report(), library.notes(), stats)
             if ending in _FINAL:
                 break
-        if not np.isfinite(library.report().cost) or not np.isfinite(at.x).all():
+        if not np.isfinite(stats["report"].cost) or not np.isfinite(at.x).all():
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         return self._result(bounds, stats)
 
@@ -108,7 +108,7 @@ class NativeSolve:
         gradient = self.library.lagrangian_gradient()
         w = np.clip(tr.join(at.x, at.u), bounds["lbx"], bounds["ubx"])
         lam_x, g, lam_g = rows.multipliers_of_bounds(at, gradient), rows.values(at), rows.lam_g(at)
-        return NlpResult(w, self.library.report().cost, g, lam_x, lam_g, stats)
+        return NlpResult(w, stats["report"].cost, g, lam_x, lam_g, stats)
 
     @cached_property
     def _rows(self) -> FlatRows:

@@ -34,17 +34,17 @@ class StageCode:
 
     # -- sizes -------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def nx(self) -> int:
         """States of a node, the final time included."""
         return self.transcription.nz
 
-    @property
+    @cached_property
     def nu(self) -> int:
         """Controls of a node."""
         return self.transcription.ocp.model.nu
 
-    @property
+    @cached_property
     def nd(self) -> int:
         """Data of a node."""
         return 3 + 2 * self.transcription.ocp.p.numel()
@@ -169,12 +169,12 @@ class StageCode:
 
     # -- the numbers of a run ----------------------------------------------------------------
 
-    @property
+    @cached_property
     def flat_size(self) -> int:
         """Length of the flat arrays: bounds and rows of all nodes."""
         return (self.transcription.n + 1) * len(self.bounded) + self.row_total
 
-    @property
+    @cached_property
     def row_total(self) -> int:
         """Rows of all nodes."""
         nc, ni, ne = self.row_counts
@@ -182,12 +182,20 @@ class StageCode:
 
     def data(self, p: np.ndarray) -> np.ndarray:
         """Return the data of all nodes, (N + 1, nd), of those of the program, ``data_vector``."""
-        n, n_p, nodes = self.transcription.n, (self.nd - 3) // 2, self.transcription.fractions
-        values = p[1 : 1 + n_p * (2 * n + 1)].reshape(2 * n + 1, n_p)
-        left, right, final = values[:n], values[n : 2 * n], values[2 * n :]
-        widths = np.append(node_widths(nodes), 0.0)
-        times = np.column_stack([np.full(n + 1, p[0]), nodes, widths])
-        return np.hstack([times, np.vstack([left, final]), np.vstack([right, final])])
+        n, n_p = self.transcription.n, (self.nd - 3) // 2
+        result, half = np.empty((n + 1, self.nd)), 3 + n_p
+        result[:, 0], result[:, 1:3] = p[0], self._grid
+        if n_p:
+            left, right = p[1:].reshape(-1, n_p)[:n], p[1:].reshape(-1, n_p)[n : 2 * n]
+            result[:n, 3:half], result[:n, half:] = left, right
+            result[n, 3:half] = result[n, half:] = p[1:].reshape(-1, n_p)[2 * n]
+        return result
+
+    @cached_property
+    def _grid(self) -> np.ndarray:
+        """Nodes and widths of the intervals after them as fractions of the horizon, (N + 1, 2)."""
+        nodes = self.transcription.fractions
+        return np.column_stack([nodes, np.append(node_widths(nodes), 0.0)])
 
 
 class _Symbols(NamedTuple):
