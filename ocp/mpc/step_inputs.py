@@ -110,7 +110,9 @@ class InputCollector:
         """Return the parameters of a horizon from t [s] on, or those of the last plan and why."""
         start, unknown, last = t, "", self._last_input(state)
         if given is not None or self.parameters is None:
-            values = self.ocp.parameter_values({**last, **given} if given else last)
+            values = self.ocp.parameter_values(
+                {**last, **given} if last and given else given or last
+            )
         else:
             try:
                 told = _told(self.parameters, t)

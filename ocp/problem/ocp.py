@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_scalar, element_names, refuse_foreign_symbols
+from ocp.checks.expressions import check_scalar, element_names
 from ocp.problem.algebraic import AlgebraicSolution, refuse_unsolvable
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
@@ -44,6 +44,8 @@ from ocp.problem.problem_checks import (
     check_distinct,
     check_ends,
     check_free_start,
+    check_last_input,
+    check_peaks,
     check_rates,
     check_start_inside,
     check_symbols,
@@ -134,7 +136,11 @@ class OCP(Portable):
         set_(self, "state_bounds", self.state_bounds.sized(model.nx, f"{self.name}: state_bounds"))
         set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
         self._check_horizon()
-        self._check_last_input()
+        check_rates(self.name, self.control_rates, model)
+        last = check_last_input(
+            self.name, self.last_input, self.control_rates, model, self.control_bounds
+        )
+        set_(self, "last_input", last)
         self._check_terms()
         self._check_start()
 
@@ -461,20 +467,6 @@ class OCP(Portable):
                 "a number of steps, a whole one, and no duration"
             )
 
-    def _check_last_input(self) -> None:
-        rates, what = self.control_rates, f"{self.name}: last_input"
-        check_rates(self.name, rates, self.model)
-        if self.last_input is None:
-            return
-        if not len(rates):
-            raise ProblemError(f"{what} is given, but no control has a Rate")
-        last = check_numbers(self.last_input, len(rates), what)
-        object.__setattr__(self, "last_input", last)
-        outside = self.control_bounds[rates.index.tolist()].excess(last)
-        for i in np.flatnonzero(outside > 0.0):
-            name = self.model.u_names[rates.index[i]]
-            raise ProblemError(f"{what}[{i}] = {last[i]} is outside the bounds of {name}")
-
     def _check_terms(self) -> None:
         name, model = self.name, self.model
         named = (*self.constraints, *self.invariants, *self.peaks)
@@ -486,9 +478,7 @@ class OCP(Portable):
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         check_data(self, self.entries)
-        allowed = [model.x, model.u, model.t, self.p, model.z]
-        for peak in self.peaks:
-            refuse_foreign_symbols(peak.expression, allowed, f"{name}: peak '{peak.name}'")
+        check_peaks(name, model, self.p, self.peaks)
         terms = [c.expression for c in (*self.constraints, *self.peaks, *self.data)]
         terms += [model.f, model.algebraic, *costs]
         check_used(name, self.unknowns, terms)

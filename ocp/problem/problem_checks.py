@@ -4,12 +4,15 @@ from collections.abc import Iterable, Sequence
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ocp.checks.arguments import check_numbers
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import element_names, refuse_foreign_symbols
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.model import Model
 from ocp.problem.parameters import Unknown
+from ocp.problem.peak import Peak
 from ocp.problem.rate import ControlRates
 
 # A measured state on its bound may lie beyond it by this, relative to 1 + abs(x).
@@ -118,6 +121,39 @@ def check_rates(owner: str, rates: ControlRates, model: Model) -> None:
                 f"{owner}: a Rate of control '{name}': another symbol is called so as well; give "
                 "it a name of its own"
             )
+
+
+def check_last_input(
+    owner: str, given: ArrayLike | None, rates: ControlRates, model: Model, bounds: Box
+) -> np.ndarray | None:
+    """Return the last input of the controls that have a rate (m,), checked; None: it is free.
+
+    Args:
+        owner: name of the problem.
+        given: by the user.
+        rates: of the problem.
+        model: its dynamics.
+        bounds: of the controls, each (nu,).
+    """
+    if given is None:
+        return None
+    what = f"{owner}: last_input"
+    if not len(rates):
+        raise ProblemError(f"{what} is given, but no control has a Rate")
+    last = check_numbers(given, len(rates), what)
+    outside = bounds[rates.index.tolist()].excess(last)
+    for i in np.flatnonzero(outside > 0.0):
+        name = model.u_names[rates.index[i]]
+        raise ProblemError(f"{what}[{i}] = {last[i]} is outside the bounds of {name}")
+    return last
+
+
+def check_peaks(owner: str, model: Model, p: ca.SX, peaks: Iterable[Peak]) -> None:
+    """Refuse a symbol that is unknown; p are parameters and other constants (n_p,)."""
+    for peak in peaks:
+        what = f"{owner}: peak '{peak.name}'"
+        allowed = [model.x, model.u, model.z, model.t, p]
+        refuse_foreign_symbols(peak.expression, allowed, what)
 
 
 def check_free_start(

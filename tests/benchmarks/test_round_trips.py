@@ -12,7 +12,21 @@ import pytest
 
 from benchmarks.cases.case import Case
 from benchmarks.cases.library.every import LIBRARY
-from ocp import OCP, Box, Constraint, FreeTime, Guess, Soft, Solution, Unknown, evaluate, solve
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    FreeTime,
+    Guess,
+    Model,
+    Peak,
+    Rate,
+    Soft,
+    Solution,
+    Unknown,
+    evaluate,
+    solve,
+)
 from ocp.internal import normal_form
 from solvers import Collocation, MultipleShooting
 
@@ -172,3 +186,68 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
         if plain.status.is_success:
             found = solve(posed, solver, guess=_guess(plain, posed))
             _agree(plain, found, FLAT.get(case.name, ALIKE))
+
+
+# Of the rate, relative to the size that its control has in a horizon.
+_WEIGHT = 1e-3
+
+
+def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
+    """Return a problem whose controls have rates, and the same with the rates as its controls."""
+    m, box = ocp.model, ocp.control_bounds
+    if m.is_discrete or not m.nu or ocp.has_free_start:
+        return None
+    r, last = ca.SX.sym("r", m.nu), box.clip(np.zeros(m.nu))
+    posed = replace(ocp, rates=(Rate(m.u, weight=_WEIGHT),), last_input=last, guess=None)
+    larger = Model(name=m.name, x=ca.vertcat(m.x, m.u), u=r, f=ca.vertcat(m.f, r), t=m.t)
+    by_hand = replace(
+        ocp,
+        model=larger,
+        x0=np.append(ocp.start(), last),
+        running_cost=ca.SX(ocp.running_cost) + _WEIGHT * ca.sumsqr(r),
+        control_bounds=Box(),
+        state_bounds=ocp.state_bounds & box,
+        start_bounds=Box(),
+        guess=None,
+    )
+    return posed, by_hand
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
+def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
+    both = _in_rates(case.build())
+    if both is None:
+        pytest.skip("it has no control in continuous time, or a free start")
+    posed, by_hand = both
+    for solver in (MultipleShooting(INTERVALS), Collocation(16)):
+        hand = solve(by_hand, solver)
+        if hand.status.is_success:
+            m = posed.model
+            guess = Guess(
+                x=hand.x[:, : m.nx], u=hand.x[:, m.nx :], duration=hand.duration
+            ) if len(np.unique(np.diff(hand.t).round(9))) == 1 else None  # fmt: skip
+            found = solve(posed, solver, guess=guess)
+            assert found.cost == pytest.approx(hand.cost, rel=FLAT.get(case.name, ALIKE), abs=ALIKE)
+            assert found.u.shape[1] == m.nu
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
+def test_with_a_peak_it_is_the_problem_with_a_constant_above(case: Case) -> None:
+    ocp, top = case.build(), ca.SX.sym("top")
+    if not ocp.model.nu or ocp.unknowns:
+        pytest.skip("it has no control, or constants already")
+    size = 1.0 + float(np.abs(ocp.start()).max())
+    rows = ocp.model.x / size
+    posed = replace(ocp, peaks=(Peak("reach", rows),))
+    by_hand = replace(
+        ocp,
+        terminal_cost=ca.SX(ocp.terminal_cost) + top,
+        unknowns=(Unknown("top", top, 1.0),),
+        constraints=(*ocp.constraints, Constraint("below", rows - top, upper=0.0)),
+    )
+    hand = solve(by_hand, MultipleShooting(INTERVALS))
+    if hand.status.is_success:
+        found = solve(posed, MultipleShooting(INTERVALS), guess=_guess(hand, posed))
+        assert found.cost == pytest.approx(hand.cost, rel=FLAT.get(case.name, ALIKE), abs=ALIKE)
