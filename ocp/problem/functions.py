@@ -27,6 +27,7 @@ class Functions:
         initial: initial constraints c, stacked.
         initial_slope: c_x (m, nx).
         terminal: terminal constraints psi, stacked.
+        instants: constraints at instants, stacked.
         integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
         measured: what is measured, stacked; of (x, t, p).
@@ -41,6 +42,7 @@ class Functions:
     initial: ca.Function
     initial_slope: ca.Function
     terminal: ca.Function
+    instants: ca.Function
     integrands: ca.Function
     invariants: ca.Function
     measured: ca.Function
@@ -81,6 +83,7 @@ class Functions:
             initial=at_an_end("initial", c),
             initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
             terminal=at_an_end("terminal", psi),
+            instants=at_an_end("instants", at("instants")),
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
             measured=at_an_end("measured", stacked(data)),

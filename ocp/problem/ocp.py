@@ -19,7 +19,7 @@ from ocp.problem.constraint_rows import (
     ProblemRows,
     depends_on,
 )
-from ocp.problem.data_checks import check_data
+from ocp.problem.data_checks import check_data, check_instants
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
@@ -69,7 +69,7 @@ class OCP(Portable):
         terminal_cost: phi(x, t, parameters).
         control_bounds: box around the controls.
         state_bounds: box around the states.
-        constraints: path, initial and terminal constraints.
+        constraints: path, initial, terminal and integral constraints, and those at instants.
         free_start: names of the states whose start the optimiser chooses, the others start at
             ``x0``; empty: none, or with an ``"initial"`` constraint all.
         start_bounds: box around the free part of the start, at the start alone.
@@ -258,6 +258,7 @@ class OCP(Portable):
             unknowns=self._unknown_rows(),
             terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
             integral=ConstraintRows.of(self.at("integral"), "integral", m),
+            instants=ConstraintRows.of(self.at("instants"), "instants", m),
             invariants=ConstraintRows.of(self.invariants, "path", m),
             time=ConstraintRow("final time", "time", 0, lower, upper),
         )
@@ -407,6 +408,7 @@ class OCP(Portable):
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         check_data(self, self.entries)
+        check_instants(self, self.at("instants"))
         terms = [c.expression for c in (*self.constraints, *self.data)] + [model.f, *costs]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
