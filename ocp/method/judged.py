@@ -96,10 +96,13 @@ def _end_fault(solution: Solution, verdict: Evaluation, accuracy: float, slack: 
     for rows, values, _ in values_at_ends(solution, truth):
         if not rows.is_imposed or not (excess := rows.excess(values)[0]).any():
             continue
-        is_initial = rows.rows[0].place == "initial"
+        place = rows.rows[0].place
+        is_initial = place == "initial"
         function = functions.initial if is_initial else functions.terminal
         along = np.abs(solution.x).max(axis=0)
-        if rows is not solution.problem.rows.start:
+        if place == "instants":
+            along = _sizes_of_rows(solution, rows)
+        elif rows is not solution.problem.rows.start:
             along = _largest_along(solution, function)
         size = np.maximum(along, _bounds(rows))
         size = np.maximum(size, _ZERO * _sizes_of_rows(solution, rows))

@@ -199,6 +199,11 @@ class MPC:
                 f"MPC of {name}: '{self.ocp.unknowns[0].name}' is an unknown constant, which every "
                 "step would choose anew: solve for it once, and make it a Parameter of that value"
             )
+        if at_instants := self.ocp.at("instants"):
+            raise UnsupportedProblem(
+                f"MPC of {name}: '{at_instants[0].name}' holds at instants of one horizon, a "
+                "loop's moves: write at='path' with a signal of the horizon that says when it holds"
+            )
         if self.ocp.data:
             raise UnsupportedProblem(
                 f"MPC of {name}: the data '{self.ocp.data[0].name}' are of one horizon, a "

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from ocp.normal_form.measurements import DataTerms, add_data
 from ocp.normal_form.peaks import add_peaks
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
+from ocp.normal_form.waypoints import Waypoints, add_waypoints
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
@@ -36,6 +38,7 @@ class NormalForm(Portable):
         last_input: where the states stand that start at the last input.
         data: what measurements at instants have added; None: nothing.
         peaks: where the largest values stand among its states, by name.
+        waypoints: what constraints at instants have added.
     """
 
     original: OCP
@@ -49,6 +52,8 @@ class NormalForm(Portable):
     rates: np.ndarray
     last_input: slice
     peaks: dict[str, slice]
+    data: DataTerms | None
+    waypoints: Waypoints
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
@@ -58,8 +63,6 @@ class NormalForm(Portable):
     def problem(self) -> OCP:
         """The one that methods get: the algebraic variables are solved for."""
         return self.implicit.explicit
-
-    data: DataTerms | None = None
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -78,8 +81,9 @@ class NormalForm(Portable):
         t: np.ndarray,
         fractions: np.ndarray,
         values: ParameterValues,
+        side: Literal[-1, 1] = -1,
     ) -> np.ndarray:
-        """Return costates (K, nx) of the original; where data are, the ones just before them.
+        """Return costates (K, nx) of the original, just before instants at which they jump.
 
         Args:
             x: states of the rewritten problem (K, n).
@@ -87,40 +91,52 @@ class NormalForm(Portable):
             t: instants [s], (K,).
             fractions: the same as fractions of the horizon.
             values: parameters of the rewritten problem.
+            side: 1: just behind these instants instead.
         """
         own = costate[:, : self.original.model.nx]
-        if self.data is None:
+        if not self.has_jumps:
             return own
-        p = values.at(fractions, -1)
-        passed = np.array(self._data_terms.map(len(t))(x.T, t[None, :], p.T)[0]).T
-        return own - np.where(fractions[:, None] > 0.0, passed, 0.0)
+        p, places = values.at(fractions, side), self.waypoints.places.values()
+        prices = np.hstack([np.zeros((len(t), 0)), *[costate[:, at] for at in places]])
+        passed = np.array(self._jump.map(len(t))(x.T, t[None, :], p.T, prices.T)).T
+        return own - np.where((fractions[:, None] > 0.0) | (side > 0), passed, 0.0)
+
+    @property
+    def has_jumps(self) -> bool:
+        """Whether costates of the original jump at instants."""
+        return self.data is not None or bool(self.waypoints.places)
 
     def integrated_data(self, x: np.ndarray, t: float, values: ParameterValues) -> float:
         """Return what data cost at the end and by the integral, for the last state (n,)."""
         if self.data is None:
             return 0.0
-        at_end = float(self._data_terms(x, t, values.at(1.0)[0])[1])
-        return at_end - float(x[self.data.integral])
+        m = self.problem.model
+        at_end = ca.Function("data", [m.x, m.t, self.problem.p], [self.data.at_end])
+        return float(at_end(x, t, values.at(1.0)[0])) - float(x[self.data.integral])
 
     @cached_property
-    def _data_terms(self) -> ca.Function:
-        assert self.data is not None
-        m, terms = self.problem.model, [self.data.slope, self.data.at_end]
-        return ca.Function("data", [m.x, m.t, self.problem.p], [ca.densify(e) for e in terms])
+    def _jump(self) -> ca.Function:
+        m, jump = self.problem.model, self.waypoints.jump
+        if self.data is not None:
+            jump = jump + self.data.slope
+        given = [m.x, m.t, self.problem.p, self.waypoints.prices]
+        return ca.Function("jump", given, [ca.densify(jump)])
 
 
 @once_per_problem
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    added = ocp.rates or ocp.peaks or ocp.data or ocp.unknowns or ocp.at("integral")
-    if not (added or ocp.model.nz or is_soft or ocp.refers_to_start):
+    along = ocp.rates or ocp.peaks or ocp.at("integral")
+    at_instants = ocp.data or ocp.at("instants")
+    constants = ocp.unknowns or ocp.refers_to_start
+    if not (along or at_instants or constants or is_soft or ocp.model.nz):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
-    data = add_data(draft)
+    data, waypoints = add_data(draft), add_waypoints(draft)
     from_start = ocp.used_of_start
     start = add_start(draft, from_start)
     peaks = add_peaks(draft)
@@ -137,5 +153,6 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         rates=len(draft.kept) + np.arange(len(draft.moved)),
         last_input=last_input,
         data=data,
+        waypoints=waypoints,
         peaks=peaks,
     )

@@ -1,5 +1,6 @@
 """Bounds and constraints, each with a name a message can use."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -8,12 +9,18 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.checks.arguments import check_flag, check_instance, check_nominal, check_numbers
+from ocp.checks.arguments import (
+    check_flag,
+    check_instance,
+    check_nominal,
+    check_numbers,
+    check_numeric,
+)
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_column
 from ocp.problem.portable import Portable
 
-Place = Literal["path", "initial", "terminal", "integral"]
+Place = Literal["path", "initial", "terminal", "integral", "instants"]
 PLACES: tuple[Place, ...] = get_args(Place)
 _RELATIONS = (ca.OP_LE, ca.OP_LT, ca.OP_EQ, ca.OP_NE)
 
@@ -146,13 +153,15 @@ class Constraint(Portable):
         upper: number or (m,).
         at: ``"path"`` (every instant), ``"initial"`` (the start is then free on the
             manifold, and ``x0`` a guess), ``"terminal"``, or ``"integral"``: the integral of the
-            expression over the horizon lies between the bounds.
+            expression over the horizon lies between the bounds. An instant, or several: seconds
+            since the start of the horizon (a waypoint); kept as ``"instants"`` and ``times``.
         nominal: a typical size of the rows, a number or (m,), to measure a violation by; None: it
             is estimated, see ``Solution.sizes``.
         limits_input: whether the rows limit what an actuator is sent, so that whatever acts has to
             meet them and no penalty makes them soft; None: where they contain controls and no
             states. With a state that holds the actuator's position, say so.
         soft: what it costs to exceed the bounds; None: they are hard.
+        times: instants [s] of ``"instants"``, increasing, (K,).
 
     Raises:
         ProblemError: naming the constraint and what is wrong with place, expression or bounds.
@@ -162,15 +171,16 @@ class Constraint(Portable):
     expression: ca.SX
     lower: ArrayLike = -np.inf
     upper: ArrayLike = np.inf
-    at: Place = "path"
+    at: Place | float | Sequence[float] = "path"
     nominal: ArrayLike | None = None
     limits_input: bool | None = None
     soft: Soft | None = None
+    times: ArrayLike = ()
 
     def __post_init__(self) -> None:
         """Stack the expression and size the bounds."""
         check_instance(self.name, str, "the name of a constraint")
-        check_place(self.at, f"constraint '{self.name}': at")
+        self._check_place()
         expression = check_column(self.expression, f"constraint '{self.name}'")
         for row in ca.vertsplit(expression):
             if row.op() in _RELATIONS:
@@ -191,6 +201,25 @@ class Constraint(Portable):
             raise ProblemError(
                 f"constraint '{self.name}' limits an input: it has to hold at='path'"
             )
+
+    def _check_place(self) -> None:
+        what = f"constraint '{self.name}': at"
+        if isinstance(self.at, int | float | list | tuple | np.ndarray | np.number):
+            object.__setattr__(self, "times", self.at)
+            object.__setattr__(self, "at", "instants")
+        check_place(self.at, what)
+        times = np.atleast_1d(check_numeric(self.times, what))
+        if (self.at == "instants") != bool(times.size):
+            raise ProblemError(f"{what}: times are given for at='instants', and for no other place")
+        if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+            raise ProblemError(f"{what}: instants must be finite and increase, not {times}")
+        times.flags.writeable = False
+        object.__setattr__(self, "times", times)
+
+    @property
+    def instants(self) -> np.ndarray:
+        """Where it holds at ``"instants"`` [s], since the start of the horizon, (K,)."""
+        return np.asarray(self.times)
 
     def _check_soft(self) -> None:
         if self.soft is None:

@@ -78,7 +78,7 @@ class Violation(NamedTuple):
         """The row, and when; empty where nothing is violated."""
         if self.row is None:
             return ""
-        when = f" at t = {self.t:.4g} s" if self.row.place == "path" else ""
+        when = f" at t = {self.t:.4g} s" if self.row.place in ("path", "instants") else ""
         return f"{self.row}{when}"
 
     def __str__(self) -> str:
@@ -106,7 +106,7 @@ class ConstraintRows:
         """Return the rows of constraints, one for each component, in their order."""
         constraints = tuple(constraints)
         expression = ca.vertcat(ca.SX(0, 1), *[c.expression for c in constraints])
-        label = "constraint" if place == "path" else f"{place} constraint"
+        label = "constraint" if place in ("path", "instants") else f"{place} constraint"
         on_x, on_u = (depends_on(expression, symbols) for symbols in (model.x, model.u))
         parts = (
             (c, low, high)
@@ -242,6 +242,7 @@ class ProblemRows:
         unknowns: bounds of the unknown constants.
         terminal: at the end.
         integral: of the integrals over the horizon.
+        instants: each at the instants of its constraint.
         invariants: what the exact dynamics keep; no method imposes them.
         rates: bounds of the rates of controls; from the last input on.
         time: the bounds of the duration [s].
@@ -255,6 +256,7 @@ class ProblemRows:
     unknowns: ConstraintRows
     terminal: ConstraintRows
     integral: ConstraintRows
+    instants: ConstraintRows
     invariants: ConstraintRows
     rates: ConstraintRows
     time: ConstraintRow

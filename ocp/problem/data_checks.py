@@ -8,6 +8,7 @@ import numpy as np
 
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import refuse_foreign_symbols
+from ocp.problem.constraint import Constraint
 from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import Entry, Parameter, Unknown
@@ -41,11 +42,6 @@ def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
         return
     _check_names(ocp.name, [m.name for m in ocp.data])
     constants = [e.symbol for e in entries if isinstance(e, Parameter | Unknown)]
-    if ocp.has_free_time:
-        raise ProblemError(
-            f"{ocp.name}: measurement '{ocp.data[0].name}': its instants are seconds, and "
-            "the final time is free: give a horizon, or scale time by an unknown constant"
-        )
     for m in ocp.data:
         what = f"{ocp.name}: measurement '{m.name}'"
         refuse_foreign_symbols(
@@ -53,16 +49,34 @@ def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
         )
         if not ca.depends_on(m.expression, ca.vertcat(ocp.model.x, ocp.model.z)):
             raise ProblemError(f"{what}: it contains no state")
-        times = np.asarray(m.times)
-        outside = (times < 0.0) | (times > ocp.duration * (1.0 + _ROUNDING))
-        if outside.any():
-            raise ProblemError(
-                f"{what}: t = {times[outside.argmax()]:g} s is not within the horizon of "
-                f"{ocp.duration:g} s"
-            )
-        step = ocp.model.dt
-        if step is not None and (np.abs(times / step - np.round(times / step)) > 1e-6).any():
-            raise ProblemError(f"{what}: its instants are no multiples of the step of {step:g} s")
+        _check_times(ocp, np.asarray(m.times), what)
+
+
+def check_instants(ocp: _Problem, constraints: Sequence[Constraint]) -> None:
+    """Refuse constraints at instants outside the horizon, or at its start."""
+    for c in constraints:
+        what = f"{ocp.name}: constraint '{c.name}'"
+        _check_times(ocp, c.instants, what)
+        if c.instants[0] <= _ROUNDING * ocp.duration:
+            raise ProblemError(f"{what}: t = 0 s is the start: write at='initial'")
+
+
+def _check_times(ocp: _Problem, times: np.ndarray, what: str) -> None:
+    """Refuse instants (K,) outside the horizon, or between the steps of discrete time."""
+    if ocp.has_free_time:
+        raise ProblemError(
+            f"{what}: its instants are seconds, and the final time is free: give a horizon, or "
+            "scale time by an unknown constant"
+        )
+    outside = (times < 0.0) | (times > ocp.duration * (1.0 + _ROUNDING))
+    if outside.any():
+        raise ProblemError(
+            f"{what}: t = {times[outside.argmax()]:g} s is not within the horizon of "
+            f"{ocp.duration:g} s"
+        )
+    step = ocp.model.dt
+    if step is not None and (np.abs(times / step - np.round(times / step)) > 1e-6).any():
+        raise ProblemError(f"{what}: its instants are no multiples of the step of {step:g} s")
 
 
 def _check_names(owner: str, names: Sequence[str]) -> None:

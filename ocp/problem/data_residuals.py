@@ -8,9 +8,9 @@ from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
 
 
-def data_fractions(ocp: OCP) -> np.ndarray:
-    """Return all instants of data as fractions of the horizon, in order, (K,)."""
-    each = [np.asarray(m.times) / ocp.duration for m in ocp.data]
+def instant_fractions(ocp: OCP) -> np.ndarray:
+    """Return all instants of data and constraints as fractions of the horizon, in order, (K,)."""
+    each = [np.asarray(e.times) / ocp.duration for e in (*ocp.data, *ocp.at("instants"))]
     return np.minimum(np.unique(np.concatenate([np.zeros(0), *each])), 1.0)
 
 

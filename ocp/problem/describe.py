@@ -121,7 +121,7 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
     yield from _rates(ocp)
     for c in ocp.constraints:
-        yield from _constraint(c, c.at)
+        yield from _constraint(c, _place(c))
     for c in ocp.invariants:
         yield from _constraint(c, "kept by the dynamics")
     for entry in ocp.unknowns:
@@ -190,6 +190,12 @@ def _constraint(c: Constraint, where: str) -> Iterable[str]:
     for i, row in enumerate(ca.vertsplit(c.expression)):
         said = f"{c.name}, {where}" if c.soft is None else f"{c.name}, {where}, {_soft(c.soft, i)}"
         yield f"    {between(lower[i], readable(row), upper[i])}   ({said})"
+
+
+def _place(c: Constraint) -> str:
+    if c.at != "instants":
+        return str(c.at)
+    return f"at t = {', '.join(f'{t:g}' for t in c.instants)}"
 
 
 def _soft(soft: Soft, row: int) -> str:

@@ -42,6 +42,8 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
         along["integral constraints"] = functions.integrands
     if ocp.peaks:
         along["peaks"] = functions.peaks
+    if ocp.at("instants"):
+        at_ends["instants constraints"] = functions.instants
     values = {name: [f(*point) for point in points] for name, f in along.items()}
     values |= {name: [f(x, t, p) for x, _, t, p in points] for name, f in at_ends.items()}
     parts = {
@@ -55,7 +57,7 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
     if ocp.free_start or ocp.start_bounds.is_active:
         parts["free start"] = np.concatenate([ocp.start_is_free, _stacked(ocp.start_bounds)])
     for at in PLACES:
-        bounds = [_stacked(c) for c in ocp.at(at)]
+        bounds = [np.append(_stacked(c), c.instants) for c in ocp.at(at)]
         if (name := f"{at} constraints") in parts:
             parts[name] = np.concatenate([parts[name], *bounds])
     if ocp.data:

@@ -28,6 +28,7 @@ class Functions:
         initial: initial constraints c, stacked.
         initial_slope: c_x (m, nx).
         terminal: terminal constraints psi, stacked.
+        instants: constraints at instants, stacked.
         integrands: of the integral constraints, stacked.
         invariants: invariants, stacked; of (x, t, p).
         algebraic: the algebraic variables (nz,).
@@ -44,6 +45,7 @@ class Functions:
     initial: ca.Function
     initial_slope: ca.Function
     terminal: ca.Function
+    instants: ca.Function
     integrands: ca.Function
     invariants: ca.Function
     algebraic: ca.Function
@@ -91,6 +93,7 @@ class Functions:
             initial=at_an_end("initial", c),
             initial_slope=at_an_end("initial_slope", ca.jacobian(c, m.x)),
             terminal=at_an_end("terminal", psi),
+            instants=at_an_end("instants", at("instants")),
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
             algebraic=along("algebraic", algebraic),

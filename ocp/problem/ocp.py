@@ -20,7 +20,7 @@ from ocp.problem.constraint_rows import (
     ProblemRows,
     depends_on,
 )
-from ocp.problem.data_checks import check_data
+from ocp.problem.data_checks import check_data, check_instants
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
@@ -77,7 +77,7 @@ class OCP(Portable):
         terminal_cost: phi(x, t, parameters).
         control_bounds: box around the controls.
         state_bounds: box around the states.
-        constraints: path, initial and terminal constraints.
+        constraints: path, initial, terminal and integral constraints, and those at instants.
         free_start: names of the states whose start the optimiser chooses, the others start at
             ``x0``; empty: none, or with an ``"initial"`` constraint all.
         start_bounds: box around the free part of the start, at the start alone.
@@ -337,6 +337,7 @@ class OCP(Portable):
             unknowns=self._unknown_rows(),
             terminal=ConstraintRows.of(self.at("terminal"), "terminal", m),
             integral=ConstraintRows.of(self.at("integral"), "integral", m),
+            instants=ConstraintRows.of(self.at("instants"), "instants", m),
             invariants=ConstraintRows.of(self.invariants, "path", m),
             rates=self._rate_rows(),
             time=ConstraintRow("final time", "time", 0, lower, upper),
@@ -478,13 +479,14 @@ class OCP(Portable):
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         check_data(self, self.entries)
+        check_instants(self, self.at("instants"))
         check_peaks(name, model, self.p, self.peaks)
         terms = [c.expression for c in (*self.constraints, *self.peaks, *self.data)]
         terms += [model.f, model.algebraic, *costs]
         check_used(name, self.unknowns, terms)
         check_unknown_names(name, self.unknowns, model.x_names)
         if model.nz:
-            at_ends = [c for c in self.constraints if c.at in ("initial", "terminal")]
+            at_ends = [c for c in self.constraints if c.at not in ("path", "integral")]
             named = [(f"{c.at} constraint '{c.name}'", c.expression) for c in at_ends]
             named += [(f"invariant '{c.name}'", c.expression) for c in self.invariants]
             named += [(f"measurement '{c.name}'", c.expression) for c in self.data]

@@ -168,6 +168,7 @@ def _constraint(c: Constraint, in_sizes: InSizes, sizes: np.ndarray, cost: float
         at=c.at,
         limits_input=c.limits_input,
         soft=None if c.soft is None else c.soft.per(sizes, cost),
+        times=c.times,
     )
 
 

@@ -7,6 +7,7 @@ problem itself knows nothing, such as the price of an integral.
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from ocp.minimum_principle.necessary_conditions import minimum_principle, symbol_type
 from ocp.normal_form.normal_form import normal_form
@@ -37,7 +38,12 @@ def extremal_law(ocp: OCP) -> ExtremalLaw:
     conditions, nx = minimum_principle(inner), inner.model.nx
     kind = symbol_type(conditions.flow)
     z, t, p = kind.sym("z", 2 * nx), kind.sym("t"), kind.sym("p", ocp.p.numel())
-    own = p[: inner.p.numel()]  # parameters come first, behind them what is a state there
+    # Parameters come first, behind them what is a state there. What steps at instants is left out:
+    # between them the flow is that of the costates behind the last one, see ``extremal_of``.
+    count = sum(e.symbol.numel() for e in ocp.parameters)
+    # Not p[:count], which of a scalar is a row without columns.
+    given, _ = ca.vertsplit(p, [0, count, p.numel()])
+    own = ca.vertcat(given, kind.zeros(inner.p.numel() - count))
     u, price = conditions.control(z[:nx], z[nx:], t, own), kind(0)
     if form is not None:
         price = ca.dot(ca.DM(ocp.control_rates.weight), u[form.rates.tolist()] ** 2)
@@ -51,5 +57,12 @@ def extremal_law(ocp: OCP) -> ExtremalLaw:
 
 
 def extremal_of(solution: Solution) -> Solution:
-    """Return the solution whose states and costates drive an extremal."""
-    return solution if solution.normal is None else solution.normal
+    """Return the solution whose states and costates, behind instants, drive an extremal."""
+    normal, form = solution.normal, normal_form(solution.problem)
+    if normal is None or form is None:
+        return solution
+    if not form.has_jumps:
+        return normal
+    at = (normal.x, normal.costate, normal.t, normal.fractions, normal.data.values)
+    own = form.costate(*at, side=1)
+    return normal.with_(costate=np.hstack([own, normal.costate[:, own.shape[1] :]]))

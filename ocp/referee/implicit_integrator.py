@@ -5,6 +5,7 @@ formulas, with a new start wherever controls or signals may jump.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -214,7 +215,7 @@ class _Extremal:
         u_start, u_end = (np.array(law(w[:, nx:].T, t[None, :], p.T)).T for w, t, p in sides)
         return u_start, u_end
 
-    @property
+    @cached_property
     def _extremal(self) -> Solution:
         return extremal_of(self.solution)
 

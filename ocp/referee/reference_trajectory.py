@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ocp.problem.data_residuals import data_cost, data_fractions, data_residuals
+from ocp.problem.data_residuals import data_cost, data_residuals, instant_fractions
 from ocp.problem.time_switches import time_switches
 from ocp.referee.control_integrators import Restarts, Steps, integrator_of
 from ocp.referee.implicit_integrator import integrate_implicitly
@@ -121,7 +121,7 @@ class Replayed:
             return solution.fractions
         values = solution.data.values
         t0, duration = float(solution.t[0]), solution.duration
-        instants = data_fractions(solution.problem)
+        instants = instant_fractions(solution.problem)
         knots = np.union1d(np.union1d(solution.fractions, values.knots), instants)
         knots = knots[np.concatenate([[True], np.diff(knots) > 1e-9])]
         switches = time_switches(solution.problem, t0, duration, values)

@@ -106,6 +106,23 @@ def values_at_ends(
     yield rows.start, truth.x[:1], truth.t[:1]
     yield rows.initial, np.array(first).T, truth.t[:1]
     yield rows.terminal, np.array(last).T, truth.t[-1:]
+    yield from _values_at_instants(solution, truth)
+
+
+def _values_at_instants(
+    solution: Solution, truth: ReferenceTrajectory
+) -> Iterator[tuple[ConstraintRows, np.ndarray, np.ndarray]]:
+    """Yield what holds at each instant: rows, their values (1, m), and when (1,)."""
+    ocp, values = solution.problem, solution.data.values
+    before, names = np.vstack([truth.x[:1], truth.ends]), [r.name for r in ocp.rows.instants.rows]
+    for c in ocp.at("instants"):
+        chosen = np.array([name == c.name for name in names])
+        rows = ocp.rows.instants.where(chosen)
+        for time in c.instants:
+            k = int(np.abs(truth.t - truth.t[0] - time).argmin())
+            p = values.at(min(1.0, time / ocp.duration))[0]
+            found = np.array(ocp.functions.instants(before[k], truth.t[k], p)).T
+            yield rows, found[:, chosen], truth.t[k : k + 1]
 
 
 def _violations(solution: Solution, truth: ReferenceTrajectory) -> Iterator[Violation]:

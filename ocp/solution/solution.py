@@ -217,11 +217,19 @@ class Solution:
 
     @property
     def multipliers(self) -> dict[str, np.ndarray]:
-        """The price of every integral constraint, by name: dJ*/d(upper bound) is minus it."""
+        """The price of every constraint on an integral, (m,), or at instants, (K, m), by name.
+
+        dJ*/d(upper bound) is minus it.
+        """
         if self.normal is None:
             return {}
         form, costate = normal_form(self.problem), self.normal.costate[-1]
-        return {} if form is None else {name: costate[at] for name, at in form.integrals.items()}
+        if form is None:
+            return {}
+        found = {name: costate[at] for name, at in form.integrals.items()}
+        for c in self.problem.at("instants"):
+            found[c.name] = costate[form.waypoints.places[c.name]].reshape(-1, c.size)
+        return found
 
     @property
     def slack(self) -> dict[str, np.ndarray]:
@@ -354,7 +362,7 @@ class Solution:
             m = self.problem.model
             x, costate = self.normal.state(t), self.normal.costate_at(t)
             form = normal_form(self.problem)
-            if form is None or form.data is None:
+            if form is None or not form.has_jumps:
                 return np.concatenate([x[..., : m.nx], costate[..., : m.nx]], axis=-1)
             points, values = np.atleast_1d(t), self.normal.data.values
             fractions = (points - self.t[0]) / self.duration

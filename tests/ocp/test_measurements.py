@@ -152,6 +152,7 @@ def test_three_methods_agree_on_cost_and_costates_that_jump():
     exact = polish(direct).or_raise()
     assert collocated.cost == pytest.approx(exact.cost, rel=1e-8)
     assert direct.cost == pytest.approx(exact.cost, rel=1e-3)
+    assert evaluate(exact).cost == pytest.approx(exact.cost, rel=1e-8)
     for t in (0.0, 0.5, 1.1, 1.7, 2.0):  # just before the data, also where they are at the end
         expected = exact.costate_at(t)
         np.testing.assert_allclose(collocated.costate_at(t), expected, atol=2e-5)
