@@ -35,6 +35,7 @@ from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.normal_form.normal_form import normal_form
+from ocp.problem.called_functions import undefined_call
 from ocp.problem.constraint_rows import (
     ConstraintRow,
     ConstraintRows,
@@ -47,7 +48,7 @@ from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
-from ocp.problem.refusal import refuse_free_ends
+from ocp.problem.refusal import refuse_compiled, refuse_free_ends, refuse_in_subprocess
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.start_feasibility import start_violation
@@ -113,7 +114,9 @@ __all__ = [
     "node_fractions",
     "node_widths",
     "normal_form",
+    "refuse_compiled",
     "refuse_free_ends",
+    "refuse_in_subprocess",
     "replacing",
     "rewriting_of",
     "scaled",
@@ -124,6 +127,7 @@ __all__ = [
     "stationary",
     "symbol_type",
     "time_unit",
+    "undefined_call",
     "walk",
     "with_checksum",
     "with_row_sizes",

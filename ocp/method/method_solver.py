@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ocp.method.rewriting import Rewriting, RewrittenProgram
 from ocp.normal_form.normal_form import normal_form
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
+from ocp.problem.refusal import refuse_without_derivatives
 from ocp.solution.solver import Program, Solver
 
 #: By how much own cost and the referee's may differ, relative, where a solver has no option.
@@ -26,10 +27,12 @@ class MethodSolver(Solver):
     Attributes:
         judged: whether a success is compared with the referee, see ``judged``. A control loop
             and methods that do it by themselves switch it off.
+        derivatives: how often the method differentiates a problem.
         takes_knots: whether knots of signals are nodes of the grid, see ``node_fractions``. A
             control loop, which reads held controls at its own instants, switches it off.
     """
 
+    derivatives: ClassVar[int] = 2
     judged: bool = field(default=True, kw_only=True, repr=False, compare=False)
     takes_knots: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
@@ -46,6 +49,7 @@ class MethodSolver(Solver):
             UnsupportedProblem: naming the term that this method cannot treat.
         """
         check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+        refuse_without_derivatives(ocp, self.derivatives, type(self).__name__)
         form = normal_form(ocp)
         if form is None:
             return self.build_normal(ocp)

@@ -1,7 +1,8 @@
 """A problem as CasADi Functions: numbers in, numbers out."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import casadi as ca
 
@@ -80,6 +81,16 @@ class Functions:
             integrands=along("integrands", at("integral")),
             invariants=at_an_end("invariants", stacked(invariants)),
         )
+
+    @cached_property
+    def called(self) -> tuple[ca.Function, ...]:
+        """What expressions call instead of writing it out: tables, external functions, callbacks.
+
+        Each once, with what they call themselves, and derivatives that occur.
+        """
+        own = (getattr(self, field.name) for field in fields(self))
+        found = {hash(each): each for function in own for each in function.find_functions()}
+        return tuple(found.values())
 
 
 def stacked(constraints: Iterable[Constraint]) -> ca.SX:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_scalar, element_names
+from ocp.problem.called_functions import check_kinks
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -407,6 +408,7 @@ class OCP(Portable):
             for part, width in (("x", model.nx), ("u", model.nu), ("costate", model.nx)):
                 self.guess.sample(part, np.array([0.0]), width)
         p = self.parameter_values().at(0.0)[0]
+        check_kinks(self.name, self.functions.called, self.smoothness)
         faults = [fault_at(self, x0, u, p) for u in self._first_controls()]
         if all(faults):
             raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")

@@ -20,6 +20,7 @@ from ocp.internal import (
     check_whole,
     epigraph,
     least_violating,
+    refuse_compiled,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend, NlpResult
@@ -122,6 +123,7 @@ class MultipleShooting(ScalingSolver):
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
+        refuse_compiled(ocp, compiled=self.compiled)
         nodes = self.nodes(ocp, ocp.steps or self.intervals)
         transcription = Transcription(
             ocp, self.intervals, self.integrator, self.compiled, nodes=nodes

@@ -21,6 +21,7 @@ from ocp.internal import (
     check_flag,
     check_positive,
     check_whole,
+    refuse_in_subprocess,
 )
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
@@ -75,6 +76,8 @@ class NlpBackend:
         Raises:
             UnsupportedProblem: for what fatrop cannot treat.
         """
+        if self.name == "fatrop" and self.time_limit < np.inf:
+            refuse_in_subprocess(transcription.ocp)
         own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
         common = QUIET | {
             "print_time": self.verbose,

@@ -1,7 +1,7 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, get_args
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ocp.internal import (
     check_instance,
     check_not_negative,
     check_whole,
+    refuse_compiled,
     refuse_free_ends,
 )
 from solvers.gradient.cost_gradient import AdjointSweeps, ControlIterate, Objective
@@ -58,6 +59,7 @@ class Schuetz(ScalingSolver):
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
     """
 
+    derivatives: ClassVar[int] = 1
     intervals: int = 75
     integrator: Integrator = field(default_factory=Euler)
     step: StepRule = field(default_factory=FixedStep)
@@ -109,6 +111,7 @@ class Schuetz(ScalingSolver):
         """Build roll-out and costate sweep."""
         check_instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
+        refuse_compiled(ocp, compiled=self.compiled)
         exact = self.gradient == "discrete"
         sweeps = AdjointSweeps.of(
             ocp, self.intervals, self.integrator, exact=exact, fast=self.compiled

@@ -16,6 +16,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    refuse_compiled,
 )
 from solvers.indirect.boundary_value_problem import ExtremalProblem
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation, advanced
@@ -91,6 +92,7 @@ class IndirectShooting(ScalingSolver):
             )
         if ocp.state_bounds.is_active:
             raise UnsupportedProblem(f"{ocp.name}: indirect shooting takes no state bounds")
+        refuse_compiled(ocp, compiled=self.compiled)
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-self.steps // self.segments)

@@ -14,6 +14,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    refuse_compiled,
     refuse_free_ends,
 )
 from solvers.direct.first_trajectory import OTHER_STATES, FirstStates
@@ -89,6 +90,7 @@ class StagewiseNewton(ScalingSolver):
         """Build stages and recursion."""
         check_instance(ocp, OCP, "stagewise Newton: the problem")
         _refuse(ocp)
+        refuse_compiled(ocp, compiled=self.compiled)
         n, fast = ocp.steps or self.intervals, self.compiled
         step = NewtonStep.of(ocp, n, self.integrator, fast=fast)
         grid = ShootingGrid.of(ocp, self.nodes(ocp, n), self.integrator, fast=fast)
