@@ -8,6 +8,8 @@ from ocp.closed_loop.rollout import Rollout
 from ocp.closed_loop.simulate import closed_loop
 from ocp.codegen.compile import Compiler, InterpretedWarning
 from ocp.estimation.estimate import Estimate, estimate
+from ocp.expressions.network import Network
+from ocp.expressions.table import Table
 from ocp.files.archive import whole_arrays
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
@@ -69,6 +71,7 @@ __all__ = [
     "Midpoint",
     "MinimumPrinciple",
     "Model",
+    "Network",
     "OCPError",
     "Parameter",
     "Peak",
@@ -91,6 +94,7 @@ __all__ = [
     "SolverError",
     "Status",
     "StepReport",
+    "Table",
     "Unknown",
     "UnsupportedProblem",
     "Work",

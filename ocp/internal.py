@@ -41,6 +41,7 @@ from ocp.normal_form.normal_form import NormalForm, normal_form
 from ocp.phases.judged_phases import judged_phases
 from ocp.phases.link import LinkRows
 from ocp.problem.algebraic_controls import AlgebraicControls
+from ocp.problem.called_functions import undefined_call
 from ocp.problem.constraint_rows import (
     ConstraintRow,
     ConstraintRows,
@@ -55,7 +56,12 @@ from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues
 from ocp.problem.portable import Portable
-from ocp.problem.refusal import refuse_free_ends, refuse_state_bounds
+from ocp.problem.refusal import (
+    refuse_compiled,
+    refuse_free_ends,
+    refuse_in_subprocess,
+    refuse_state_bounds,
+)
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.start_feasibility import start_violation
@@ -135,7 +141,9 @@ __all__ = [
     "node_widths",
     "normal_form",
     "number_of",
+    "refuse_compiled",
     "refuse_free_ends",
+    "refuse_in_subprocess",
     "refuse_state_bounds",
     "replacing",
     "rewriting_of",
@@ -147,6 +155,7 @@ __all__ = [
     "stationary",
     "symbol_type",
     "time_unit",
+    "undefined_call",
     "walk",
     "with_checksum",
     "with_row_sizes",

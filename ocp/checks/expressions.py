@@ -8,8 +8,9 @@ import numpy as np
 
 from ocp.checks.arguments import class_in_words
 from ocp.checks.errors import ProblemError
+from ocp.checks.scalar_form import scalar_form
 
-Expression = ca.SX | ca.DM | float | int | np.ndarray | Sequence
+Expression = ca.SX | ca.MX | ca.DM | float | int | np.ndarray | Sequence
 
 # An expression longer than this says less than its dimensions do.
 _READABLE = 100
@@ -17,8 +18,10 @@ _READABLE = 100
 _NAMED_NUMBER = re.compile(r"(@\d+)=(-?[\d.]+(?:e[-+]?\d+)?), ")
 
 
-def check_symbols(symbols: ca.SX, what: str) -> None:
-    """Raise unless ``symbols`` is a column of distinct ``SX`` symbols."""
+def check_symbols(symbols: ca.SX | ca.MX, what: str) -> ca.SX:
+    """Return ``symbols`` as ``SX``, or raise unless they are a column of distinct symbols."""
+    if isinstance(symbols, ca.MX):
+        symbols = scalar_form(symbols)
     if not isinstance(symbols, ca.SX):
         raise ProblemError(f"{what} is {class_in_words(symbols)}; write it with casadi.SX.sym")
     if symbols.shape[1] != 1 or not symbols.is_dense():
@@ -34,6 +37,7 @@ def check_symbols(symbols: ca.SX, what: str) -> None:
         raise ProblemError(
             f"{what} contains the same symbol twice: {', '.join(element_names(symbols))}"
         )
+    return symbols
 
 
 def element_names(symbols: ca.SX) -> tuple[str, ...]:
@@ -46,6 +50,8 @@ def check_column(expression: Expression, what: str) -> ca.SX:
     try:
         if isinstance(expression, list | tuple):
             expression = ca.vertcat(*expression)
+        if isinstance(expression, ca.MX):
+            expression = scalar_form(expression)
         result = ca.SX(expression)
     except (TypeError, ValueError, NotImplementedError) as error:
         raise ProblemError(
@@ -68,12 +74,19 @@ def refuse_foreign_symbols(expression: ca.SX, allowed: Sequence[ca.SX], what: st
     """Raise ``ProblemError`` naming each symbol of ``expression`` that is not ``allowed``."""
     known = {e.element_hash() for block in allowed for e in ca.vertsplit(ca.vec(block))}
     foreign = [str(s) for s in ca.symvar(expression) if s.element_hash() not in known]
-    if foreign:
-        raise ProblemError(
-            f"{what} contains {', '.join(sorted(foreign))}, unknown at this place: "
-            "it must be a state, a control, the time given as Model(t=...) or a declared "
-            "parameter (no controls in initial or terminal terms)"
-        )
+    if not foreign:
+        return
+    names = {str(e) for block in allowed for e in ca.vertsplit(ca.vec(block))}
+    twins = ", ".join(sorted(names.intersection(foreign)))
+    said = (
+        f"; the {twins} of this problem is another symbol of the same name: made a second time, "
+        "or one of MX where the other is of SX; write all terms with the same"
+    )
+    raise ProblemError(
+        f"{what} contains {', '.join(sorted(foreign))}, unknown at this place: "
+        "it must be a state, a control, the time given as Model(t=...) or a declared "
+        f"parameter (no controls in initial or terminal terms){said * bool(twins)}"
+    )
 
 
 def readable(expression: ca.SX) -> str:

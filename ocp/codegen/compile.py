@@ -21,6 +21,7 @@ from ocp.checks.arguments import check_instance
 from ocp.checks.errors import ProblemError
 from ocp.codegen.kept_library import keep_library, kept_library
 from ocp.codegen.run_limited import run_limited
+from ocp.expressions.foreign_functions import external
 from ocp.files.draft import draft_folder
 
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -131,6 +132,7 @@ def compiled(
         if function.is_diff_in() != options["is_diff_in"]:
             function = _tidied(function, options)
     try:
+        _refuse_foreign(function)
         library = built_library(c_code(function, along), compiler or Compiler())
         loaded = _loaded(function.name(), library, options)
         _compare(function, loaded, along)
@@ -138,6 +140,14 @@ def compiled(
     except Unbuildable as reason:
         _announce(f"no compiled functions: {reason}. They run interpreted.")
         return function
+
+
+def _refuse_foreign(function: ca.Function) -> None:
+    """Raise where a function calls what is not here: its library would end the process."""
+    for called in external(function.find_functions()):
+        raise Unbuildable(
+            f"{function.name()} calls '{called.name()}', an external function or a callback"
+        )
 
 
 def c_code(function: ca.Function, along: Sequence[str] = ()) -> str:

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.interrupts import interruptible
+from ocp.expressions.table import has_ends
 from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
+from ocp.problem.end_of_definition import end_of_definition
 from ocp.problem.run_data import RunData
 from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution, Work
@@ -83,6 +85,8 @@ class MethodProgram(BuiltProgram):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
+        if undefined := _undefined(solution):
+            return solution.with_(message="; ".join(filter(None, [solution.message, undefined])))
         if self._differentiates and (jumped := _across_a_jump(solution)):
             return jumped
         if not self.solver.judged:
@@ -110,6 +114,19 @@ class MethodProgram(BuiltProgram):
     @cached_property
     def _solver_text(self) -> str:
         return repr(self.solver)
+
+
+def _undefined(solution: Solution) -> str:
+    """Return which function has no value at the end of what a failed run has found, in words."""
+    if solution.status.is_success:
+        return ""
+    ocp, t, p = solution.problem, solution.t, solution.data.values.at(solution.fractions)
+    if found := end_of_definition(ocp, t, solution.x, solution.control(t), p):
+        return found
+    ending = [f"'{f.name()}'" for f in ocp.functions.called if has_ends(f)]
+    if solution.status is Status.DIVERGED and ending:  # its iterates went further
+        return f"table {ending[0]} has no value beyond its ends; beyond='extend' would have"
+    return ""
 
 
 def _across_a_jump(solution: Solution) -> Solution | None:

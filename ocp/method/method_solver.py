@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Self, overload
+from typing import ClassVar, Self, overload
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ocp.normal_form.normal_form import NormalForm, normal_form
 from ocp.problem.grid import Grid
 from ocp.problem.node_fractions import node_fractions
 from ocp.problem.ocp import OCP
+from ocp.problem.refusal import refuse_without_derivatives
 from ocp.solution.composite import CompositeProblem, CompositeProgram, S
 from ocp.solution.solver import Program, Solver
 
@@ -28,10 +29,12 @@ class MethodSolver(Solver):
     Attributes:
         judged: whether a success is compared with the referee, see ``judged``. A control loop
             and methods that do it by themselves switch it off.
+        derivatives: how often the method differentiates a problem.
         takes_knots: whether knots of signals are nodes of the grid, see ``node_fractions``. A
             control loop, which reads held controls at its own instants, switches it off.
     """
 
+    derivatives: ClassVar[int] = 2
     judged: bool = field(default=True, kw_only=True, repr=False, compare=False)
     takes_knots: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
@@ -57,6 +60,7 @@ class MethodSolver(Solver):
         if isinstance(ocp, CompositeProblem):
             return ocp.built_by(self)
         self.refuse_written(ocp)
+        refuse_without_derivatives(ocp, self.derivatives, type(self).__name__)
         form = normal_form(ocp)
         if form is None:
             return self.build_normal(ocp)

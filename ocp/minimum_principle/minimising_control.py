@@ -28,8 +28,10 @@ def minimising_control(ocp: OCP, h: Hamiltonian) -> ca.Function:
     diagonal = e.curvature.sparsity().is_diag()
     if ca.depends_on(e.curvature, m.u) or (box.is_active and not diagonal):
         return _implicit_control(ocp, h)
-    at_zero = ca.substitute(e.gradient, m.u, ca.DM.zeros(m.nu))
-    free = -at_zero / ca.diag(e.curvature) if diagonal else -ca.solve(e.curvature, at_zero)
+    # In both: an expression may contain a control without depending on it.
+    zero = ca.SX.zeros(m.nu)
+    at_zero, curvature = ca.substitute([e.gradient, e.curvature], [m.u], [zero])
+    free = -at_zero / ca.diag(curvature) if diagonal else -ca.solve(curvature, at_zero)
     bounded = box.clip_expression(free)
     return ca.Function("control", [m.x, e.costate, m.t, p], [bounded], _LAW_INPUTS, ["u"])
 
@@ -51,7 +53,7 @@ def _implicit_control(ocp: OCP, h: Hamiltonian) -> ca.Function:
     root = ca.rootfinder("root", "newton", {"x": u, "p": given, "g": residual}, options)
     start: Any = box.clip(np.zeros(m.nu))
     if ca.depends_on(h.expressions.curvature, m.u):  # else H is convex, and any start will do
-        start = _descent(ocp, h).fold(_DESCENTS)(start, *inputs)
+        start = _constant(_descent(ocp, h).fold(_DESCENTS))(start, *inputs)
     found = root(start, given)
     bounded = box.clip_expression(found)  # the root is, up to rounding
     return ca.Function("control", inputs, [bounded], _LAW_INPUTS, ["u"])
@@ -74,6 +76,13 @@ def _descent(ocp: OCP, h: Hamiltonian) -> ca.Function:
     moves += [sign * ca.DM(unit) for unit in np.eye(m.nu) for sign in (1.0, -1.0)]
     tried = [box.clip_expression(m.u + move) for move in moves]
     return ca.Function("descent", [m.u, *inputs], [_lowest(h, inputs, [m.u, *tried])])
+
+
+def _constant(function: ca.Function) -> ca.Function:
+    """Return a function without derivatives: a root does not depend on where it is looked for."""
+    inputs = function.mx_in()
+    options = {"is_diff_in": [False] * len(inputs), "is_diff_out": [False]}
+    return ca.Function("start", inputs, function.call(inputs), options)
 
 
 def _lowest(h: Hamiltonian, inputs: list[ca.SX], controls: list) -> ca.SX:

@@ -231,7 +231,9 @@ class _Rewritten:
         rows = ca.vertcat(self.cost, *[-c for c in self.constraints])
         # A slack has the slope -1 in its own two rows, minus the constraints.
         own = ca.kron(ca.DM.eye(len(self.slacks)), ca.DM.ones(2, 1))
-        return ca.densify(ca.jacobian(rows, self.s)) + ca.vertcat(ca.DM(1, len(self.slacks)), own)
+        # Backwards, what is called with other arguments stays out of it.
+        slopes = ca.jacobian(rows, self.s, {"helper_options": {"ad_weight": 1.0}})
+        return ca.densify(slopes) + ca.vertcat(ca.DM(1, len(self.slacks)), own)
 
     def unfit(self, ocp: OCP, *, held: bool) -> frozenset[int]:
         """Return which maxima a slack does not replace, as instructions."""
@@ -241,6 +243,7 @@ class _Rewritten:
             weight = weights[:, j]
             varies = ca.depends_on(weight, ca.vertcat(m.x, m.u, self.s))
             varies = varies or _bends(weight, ocp)
+            varies = varies or weight.is_zero()  # it stands in the argument of a call
             if not varies and not ca.depends_on(weight, ca.vertcat(m.t, ocp.p)):
                 varies = not (np.array(ca.evalf(weight)) >= 0.0).all()
             if varies or (held and ca.depends_on(self.maxima[j], changing)):

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.checks.expressions import readable
+from ocp.problem.called_functions import undefined_call
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.functions import Functions
 from ocp.problem.model import Model
@@ -28,6 +29,11 @@ class _Problem(Protocol):
     @property
     def terminal_cost(self) -> ca.SX | float:
         """The cost at the end."""
+        ...
+
+    @property
+    def p(self) -> ca.SX:
+        """Symbols of all that a run gives."""
         ...
 
     @property
@@ -60,7 +66,8 @@ def fault_at(ocp: _Problem, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> str:
         u: controls (nu,).
         p: parameters (n_p,).
     """
-    functions, path = ocp.functions, [c for c in ocp.constraints if c.at == "path"]
+    m, functions = ocp.model, ocp.functions
+    symbols, path = ca.vertcat(m.x, m.u, m.t, ocp.p), [c for c in ocp.constraints if c.at == "path"]
     constraints = ca.vertcat(ca.SX(0, 1), *[c.expression for c in path])
     for what, expression, value in (
         ("dynamics f", ocp.model.f, functions.rate(x, u, 0.0, p)),
@@ -70,6 +77,8 @@ def fault_at(ocp: _Problem, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> str:
     ):
         rows = np.flatnonzero(~np.isfinite(np.asarray(value, dtype=float).ravel()))
         if rows.size:
-            said = readable(ca.vertsplit(ca.densify(ca.SX(expression)))[int(rows[0])])
-            return f"{what} (row {rows[0]}) is not finite at x0 = {x}, u = {u}: {said}"
+            row = ca.vertsplit(ca.densify(ca.SX(expression)))[int(rows[0])]
+            fault = f"{what} (row {rows[0]}) is not finite at x0 = {x}, u = {u}: {readable(row)}"
+            lost = undefined_call(row, symbols, np.concatenate([x, u, [0.0], p])[None, :])
+            return f"{fault}; {lost.said}" if lost else fault
     return ""

@@ -1,7 +1,8 @@
 """A problem as CasADi Functions: numbers in, numbers out."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import casadi as ca
 
@@ -100,6 +101,16 @@ class Functions:
             measured=at_an_end("measured", stacked(data)),
             peaks=along("peaks", stacked(peaks)),
         )
+
+    @cached_property
+    def called(self) -> tuple[ca.Function, ...]:
+        """What expressions call instead of writing it out: tables, external functions, callbacks.
+
+        Each once, with what they call themselves, and derivatives that occur.
+        """
+        own = (getattr(self, field.name) for field in fields(self))
+        found = {hash(each): each for function in own for each in function.find_functions()}
+        return tuple(found.values())
 
 
 def stacked(constraints: Iterable[Constraint | Measurement | Peak]) -> ca.SX:

@@ -6,7 +6,7 @@ import numpy as np
 from ocp.checks.expressions import readable
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
-from ocp.problem.switches import operations
+from ocp.problem.walk import operations
 
 # Random controls between which a kink is looked for, and halvings of their distance.
 _CONTROLS, _HALVINGS = 12, 45

@@ -30,7 +30,8 @@ class Model(Portable):
 
     Args:
         name: what people call it.
-        x: state symbols, an ``SX`` column (nx,).
+        x: state symbols, an ``SX`` column (nx,). All terms of a problem may be written in ``MX``
+            as well: every symbol of MX is the same one of SX in all of them.
         u: control symbols, an ``SX`` column (nu,).
         f: right-hand side (nx,), an expression in x, u, t and the problem's parameters.
         t: the symbol of time [s], needed only where ``f`` or a cost depends on time.
@@ -73,7 +74,8 @@ class Model(Portable):
         """Check every shape and symbol."""
         check_instance(self.name, str, "the name of a model")
         for label in ("x", "u", "t", "z"):
-            check_symbols(getattr(self, label), f"model '{self.name}': {label}")
+            symbols = check_symbols(getattr(self, label), f"model '{self.name}': {label}")
+            object.__setattr__(self, label, symbols)
         if self.t.numel() != 1:
             raise ProblemError(
                 f"model '{self.name}': t has shape {self.t.shape}, it must be (1, 1)"

@@ -34,6 +34,8 @@ _ROUNDING = 1e-9
 # What changes by more than this part of itself with a tick of the clock, a part of the horizon, is
 # decided by rounding.
 _UNSTEADY, _TICK = 0.5, 1e-12
+# Beside a point, at so many others, a called function has its usual size, of which this is noise.
+_BESIDE, _NOISE = 4, 1e-13
 # Rounds of least squares: the later ones take derivatives a size away from the start.
 _ROUNDS = 3
 # A row has at least this part of its distance from the bounds as its size.
@@ -146,6 +148,7 @@ class _Functions:
         costs: -> running cost and its gradients in (x, u) and p; the same of the terminal cost.
         constraints: by name: values and Jacobian in (x, u).
         is_timed: whether any of them depends on the clock.
+        calls: whether any of them calls a function, such as a table, whose zeros have rounding.
     """
 
     nx: int
@@ -154,6 +157,7 @@ class _Functions:
     costs: ca.Function
     constraints: dict[str, tuple[Constraint, ca.Function]]
     is_timed: bool
+    calls: bool
 
     @classmethod
     def of(cls, ocp: OCP) -> "_Functions":
@@ -183,6 +187,7 @@ class _Functions:
             costs=ca.Function("costs", given, [ca.densify(o) for o in outputs]),
             constraints=constraints,
             is_timed=ca.depends_on(ca.veccat(*written), m.t),
+            calls=bool(ocp.functions.called),
         )
 
     def _values(self, function: ca.Function, point: _Point) -> list[np.ndarray]:
@@ -190,6 +195,8 @@ class _Functions:
 
         A sine that is zero at an instant but for rounding says nothing of sizes there.
         """
+        if self.calls:
+            return self._without_rounding(function, point)
         if not self.is_timed:
             return [np.array(here) for here in function(*point)]
         later = point._replace(t=point.t + _TICK * self.horizon)
@@ -200,6 +207,19 @@ class _Functions:
                 np.where(np.abs(there - here) > _UNSTEADY * np.abs(here), 0.0, here)
                 for here, there in both
             ]
+
+    def _without_rounding(self, function: ca.Function, point: _Point) -> list[np.ndarray]:
+        """Return the outputs at a point, 0 where they are rounding of what they are beside it."""
+        rng, found = np.random.default_rng(0), [np.array(here) for here in function(*point)]
+        largest = [np.zeros(here.shape) for here in found]
+        for _ in range(_BESIDE):
+            x, u = (w + rng.uniform(-1, 1, len(w)) * (1 + np.abs(w)) for w in (point.x, point.u))
+            values = function(*point._replace(x=x, u=u))
+            largest = [
+                np.fmax(a, np.abs(np.array(b))) for a, b in zip(largest, values, strict=True)
+            ]
+        each = zip(found, largest, strict=True)
+        return [np.where(np.abs(a) <= _NOISE * most, 0.0, a) for a, most in each]
 
     def equations(self, point: _Point) -> Iterator[SizeEquation]:
         """Yield what dynamics and constraints at a point say of the sizes."""

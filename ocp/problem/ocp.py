@@ -13,6 +13,7 @@ from ocp.checks.arguments import check_instance, check_numbers, check_positive
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import check_scalar, element_names
 from ocp.problem.algebraic import AlgebraicSolution, refuse_unsolvable
+from ocp.problem.called_functions import check_kinks
 from ocp.problem.constraint import Box, Constraint, Place, check_place
 from ocp.problem.constraint_rows import (
     ConstraintRow,
@@ -505,6 +506,7 @@ class OCP(Portable):
         controls = self._first_controls()
         if model.nz:
             refuse_unsolvable(self.algebraic_solution, self.p, [(x0, u, 0.0, p) for u in controls])
+        check_kinks(self.name, self.functions.called, self.smoothness)
         faults = [fault_at(self, x0, u, p) for u in controls]
         if all(faults):
             raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")

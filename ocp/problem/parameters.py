@@ -56,7 +56,8 @@ class Parameter(_Constant):
 
     def __post_init__(self) -> None:
         """Check symbol and value."""
-        check_symbols(self.symbol, f"parameter '{self.name}'")
+        symbol = check_symbols(self.symbol, f"parameter '{self.name}'")
+        object.__setattr__(self, "symbol", symbol)
         object.__setattr__(self, "value", self.checked(self.value))
 
 
@@ -89,7 +90,7 @@ class Unknown(_Constant):
         """Check symbol, guess and bounds."""
         check_instance(self.name, str, "the name of an unknown constant")
         what = f"{self.kind} '{self.name}'"
-        check_symbols(self.symbol, what)
+        object.__setattr__(self, "symbol", check_symbols(self.symbol, what))
         guess, box = self.checked(self.guess), Box(self.lower, self.upper)
         box = box.sized(self.symbol.numel(), what)
         if box.excess(guess).any():
@@ -158,7 +159,8 @@ class Signal(Portable):
 
     def __post_init__(self) -> None:
         """Check symbol and samples."""
-        check_symbols(self.symbol, f"signal '{self.name}'")
+        symbol = check_symbols(self.symbol, f"signal '{self.name}'")
+        object.__setattr__(self, "symbol", symbol)
         if self.hold not in ("held", "linear"):
             raise ProblemError(
                 f"signal '{self.name}': hold = {self.hold!r} is neither held nor linear"

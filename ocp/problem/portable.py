@@ -17,6 +17,9 @@ from weakref import WeakValueDictionary
 import casadi as ca
 import numpy as np
 
+from ocp.checks.errors import ProblemError
+from ocp.expressions.foreign_functions import callbacks
+
 
 class Portable:
     """Base of frozen dataclasses that may hold ``SX``: copied, and pickled, by their fields.
@@ -68,6 +71,11 @@ class _Written:
         symbols = ca.symvar(ca.veccat(*self.values))
         inputs = [ca.vertcat(ca.SX(0, 1), *symbols)]
         function = ca.Function("expressions", inputs, self.values)
+        for called in callbacks(function.find_functions()):
+            raise ProblemError(
+                f"no pickle takes what calls '{called.name()}', a Python callback: it belongs to "
+                "this process; take a Table or an external function"
+            )
         return _read, (function.serialize(), [_Symbol.of(symbol) for symbol in symbols])
 
 

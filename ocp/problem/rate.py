@@ -47,8 +47,9 @@ class Rate(Portable):
 
     def __post_init__(self) -> None:
         """Check symbols, bounds and weight."""
-        check_symbols(self.control, "Rate: control")
-        names = element_names(self.control)
+        control = check_symbols(self.control, "Rate: control")
+        object.__setattr__(self, "control", control)
+        names = element_names(control)
         size, what = len(names), f"rate of {', '.join(names)}"
         box = Box(self.lower, self.upper).sized(size, what)
         weight = check_numbers(self.weight, size, f"{what}: weight")

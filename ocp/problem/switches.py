@@ -1,6 +1,5 @@
 """Where dynamics, running cost and path constraints may jump: the switches in their expressions."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
@@ -8,6 +7,7 @@ import casadi as ca
 from ocp.checks.expressions import readable
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
+from ocp.problem.walk import operations
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
 # A condition made of comparisons has these as switches, not itself.
@@ -78,16 +78,3 @@ def _level(node: ca.SX) -> ca.SX | None:
     if operation == ca.OP_ATAN2:
         return (node.dep(0) < 0) * (node.dep(1) < 0)
     return None
-
-
-def operations(expression: ca.SX) -> Iterator[ca.SX]:
-    """Yield every operation in an expression once."""
-    seen: set[int] = set()
-    stack = ca.vertsplit(expression)
-    while stack:
-        node = stack.pop()
-        if node.is_constant() or node.is_symbolic() or node.element_hash() in seen:
-            continue
-        seen.add(node.element_hash())
-        yield node
-        stack.extend(node.dep(i) for i in range(node.n_dep()))

@@ -6,7 +6,7 @@ import numpy as np
 from ocp.problem.cache import once_per_problem
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
-from ocp.problem.switches import operations
+from ocp.problem.walk import operations
 
 # Instants at which every difference is looked at, and halvings of what lies between two.
 _LOOKS, _HALVINGS = 2001, 50

@@ -7,7 +7,9 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.interrupts import interruptible
+from ocp.expressions.foreign_functions import without_derivatives
 from ocp.normal_form.normal_form import normal_form
+from ocp.problem.end_of_definition import end_of_definition
 from ocp.referee.integrate_controls import integrate_controls
 from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
@@ -20,6 +22,8 @@ from ocp.solution.solution import Solution
 
 # Accepted error of the cost, relative to its size.
 TOLERANCE = 1e-9
+# States at which a function is looked for that has no value, the last known one among them.
+_LOOKS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +41,9 @@ class Evaluation:
             abs(u - clip(u - H_u)) with the referee's own costates, for a held control
             averaged over its interval, for a polynomial one by its coefficients, and of
             transversality at free ends; None where a path constraint or state bound is active
-            (its multiplier would be needed), and for stiff or unstable dynamics, along which
-            explicit steps of the adjoint would not stay finite.
+            (its multiplier would be needed), for stiff or unstable dynamics, along which
+            explicit steps of the adjoint would not stay finite, and where an external function
+            has no second derivatives.
         task_drift: largest violation of the problem's invariants.
         defect: largest distance of the solution's states from the true ones at its nodes.
         replay: ``"open loop"``: the controls are applied from the start to the end; or
@@ -104,7 +109,7 @@ def evaluate(
 def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
     truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
-        return _lost(truth)
+        return _lost(solution, truth)
     violation, price = largest_violation(solution, truth), price_of_rates(solution)
     worst = "a control jumps that has a Rate" if np.isinf(price) else ""
     in_open_loop = truth.replay == "open loop"
@@ -134,12 +139,14 @@ def _stationarity(solution: Solution, truth: ReferenceTrajectory) -> float | Non
     """The residual of the minimum principle, which is that of the normal form."""
     if solution.normal is not None:
         return _evaluation(solution.normal, TOLERANCE).stationarity
+    if any(without_derivatives(solution.problem.functions.called, 2)):
+        return None
     return stationarity(solution, truth)
 
 
-def _lost(truth: ReferenceTrajectory) -> Evaluation:
+def _lost(solution: Solution, truth: ReferenceTrajectory) -> Evaluation:
     """The verdict on a trajectory that is not finite."""
-    unresolved = f"not resolved in {len(truth.t) - 1} steps"
+    unresolved = _undefined(solution, truth) or f"not resolved in {len(truth.t) - 1} steps"
     return Evaluation(
         cost=np.inf,
         cost_error=np.inf,
@@ -154,6 +161,17 @@ def _lost(truth: ReferenceTrajectory) -> Evaluation:
         resolution=truth.resolution,
         truth=truth,
     )
+
+
+def _undefined(solution: Solution, truth: ReferenceTrajectory) -> str:
+    """Return which function has no value where a trajectory ends; "" if none is found."""
+    lost = ~np.isfinite(truth.x).all(axis=1)
+    known = int(lost.argmax()) if lost.any() else len(truth.t)
+    looks = np.unique(np.linspace(0, known - 1, _LOOKS).astype(int))
+    t = truth.t[looks]
+    fractions = (t - truth.t[0]) / (truth.t[-1] - truth.t[0])
+    p = solution.data.values.at(fractions)
+    return end_of_definition(solution.problem, t, truth.x[looks], solution.control(t), p)
 
 
 def costates_along(solution: Solution) -> Solution:

@@ -20,6 +20,7 @@ from ocp.internal import (
     check_positive,
     epigraph,
     least_violating,
+    refuse_compiled,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
 from solvers.direct.nlp_backends import Nlp, NlpBackend
@@ -130,6 +131,7 @@ class MultipleShooting(BlockingSolver):
 
     def prepare(self, ocp: OCP) -> "MultipleShootingProgram":
         """Transcribe the problem and set the backend up."""
+        refuse_compiled(ocp, compiled=self.compiled)
         nodes = self.nodes(ocp, self.intervals)
         n = len(nodes) - 1
         blocks = self.blocks_on(ocp, n)

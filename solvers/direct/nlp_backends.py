@@ -21,6 +21,7 @@ from ocp.internal import (
     check_flag,
     check_positive,
     check_whole,
+    refuse_in_subprocess,
 )
 from solvers.direct.native.native_library import NativeLibrary, NativeReport
 from solvers.direct.native.native_solve import NativeLimits, NativeSolve
@@ -83,6 +84,8 @@ class NlpBackend:
         """
         if self.name == "native":
             return self._native(transcription)
+        if self.name == "fatrop" and self.time_limit < np.inf:
+            refuse_in_subprocess(transcription.ocp)
         own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
         common = QUIET | {
             "print_time": self.verbose,

@@ -1,7 +1,7 @@
 """Schuetz' method: gradient descent on the controls (Algorithm 2), and a sound version."""
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, get_args
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from ocp.internal import (
     check_not_negative,
     check_whole,
     node_fractions,
+    refuse_compiled,
     refuse_free_ends,
     refuse_state_bounds,
 )
@@ -63,6 +64,7 @@ class Schuetz(BlockingSolver):
         blocks: see ``MultipleShooting``.
     """
 
+    derivatives: ClassVar[int] = 1
     intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=Euler)
     step: StepRule = field(default_factory=FixedStep)
@@ -114,6 +116,7 @@ class Schuetz(BlockingSolver):
         """Build roll-out and costate sweep."""
         check_instance(ocp, OCP, "Schuetz: the problem")
         _refuse_constraints(ocp)
+        refuse_compiled(ocp, compiled=self.compiled)
         exact = self.gradient == "discrete"
         nodes = node_fractions(ocp, self.intervals)
         sweeps = AdjointSweeps.of(ocp, nodes, self.integrator, exact=exact, fast=self.compiled)

@@ -28,6 +28,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     number_of,
+    refuse_compiled,
     refuse_state_bounds,
 )
 from solvers.indirect.boundary_value_problem import ExtremalProblem
@@ -111,6 +112,7 @@ class IndirectShooting(ScalingSolver):
                 f"{ocp.name}: indirect shooting takes no path constraint ('{c.name}')"
             )
         refuse_state_bounds(ocp, "indirect shooting")
+        refuse_compiled(ocp, compiled=self.compiled)
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-number_of(self.steps) // self.segments)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +76,7 @@ class GridDP(MethodSolver):
         memory: largest memory that a program may take [bytes].
     """
 
+    derivatives: ClassVar[int] = 1
     states: Points = 101
     controls: Points = 41
     intervals: int = 50

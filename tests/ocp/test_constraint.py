@@ -101,7 +101,7 @@ def test_constraint_stacks_its_rows_and_sizes_its_bounds() -> None:
             "somewhere",
             "at = 'somewhere' is no place; 'path', 'initial', 'terminal', 'integral' are",
         ),
-        (ca.MX.sym("x"), (0.0, 1.0), "path", "constraint 'c' is an MX"),
+        (ca.MX.sym("x", 2, 2), (0.0, 1.0), "path", r"constraint 'c' has shape \(2, 2\)"),
         (ca.SX.sym("x", 2, 2), (0.0, 1.0), "path", r"constraint 'c' has shape \(2, 2\)"),
         (ca.SX.sym("x"), (1.0, 0.0), "path", r"constraint 'c'\[0\]: no number"),
         (ca.SX.sym("x"), ([0.0, 0.0], 1.0), "path", "constraint 'c': lower has 2"),

@@ -101,7 +101,7 @@ def test_values_cannot_be_changed_behind_the_problem() -> None:
         (lambda s: Parameter("p", s, [1.0, np.nan]), r"parameter 'p'\[1\] is nan"),
         (lambda s: Parameter("p", s, [1.0, np.inf]), r"parameter 'p'\[1\] is inf"),
         (lambda s: Parameter("p", 2 * s, 1.0), "parameter 'p' must be a dense column"),
-        (lambda s: Parameter("p", MX, 1.0), "parameter 'p' is an MX"),
+        (lambda s: Parameter("p", 2 * MX, 1.0), "dense column of symbols"),
         (lambda s: Parameter("p", s, "one"), "parameter 'p' is not numeric"),
         (lambda s: Signal("r", s, np.zeros((5, 3))), r"signal 'r': samples have shape \(5, 3\)"),
         (lambda s: Signal("r", s, np.zeros((1, 2))), r"shape \(1, 2\), \(N \+ 1, 2\) is needed"),
@@ -111,7 +111,7 @@ def test_values_cannot_be_changed_behind_the_problem() -> None:
         (lambda s: Signal("r", s, np.zeros((4, 2)), hold=CUBIC), "hold = 'cubic'"),
         (lambda s: Signal("r", s, [[1.0, 2.0], [3.0]]), "signal 'r'"),
         (lambda s: Signal("r", s, "ramp"), "signal 'r'"),
-        (lambda s: Signal("r", MX, [0.0, 1.0]), "signal 'r' is an MX"),
+        (lambda s: Signal("r", 2 * MX, [0.0, 1.0]), "dense column of symbols"),
     ],
 )
 def test_refuses(build, message: str) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ocp.internal import undefined_call
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.graph import appearing, operations, shown
@@ -77,6 +78,15 @@ def _finding(
                 value,
                 instant=t,
             )
+    if lost := _undefined(subject, expression, point):
+        return Finding(
+            Cause.NOT_FINITE,
+            Severity.ERROR,
+            appearing(subject.ocp, expression),
+            f"In {what}, {lost}.",
+            float("inf"),
+            instant=t,
+        )
     return Finding(
         Cause.NOT_FINITE,
         Severity.ERROR,
@@ -86,3 +96,11 @@ def _finding(
         float("inf"),
         instant=t,
     )
+
+
+def _undefined(subject: DiagnosedProblem, expression: ca.SX, point: SamplePoints) -> str:
+    """Return which function that is called has no value at a point; "" if none is found."""
+    m = subject.ocp.model
+    numbers = np.hstack([point.x, point.u, point.t[:, None], point.p])
+    found = undefined_call(expression, ca.vertcat(m.x, m.u, m.t, subject.ocp.p), numbers)
+    return found.said if found else ""

@@ -15,6 +15,7 @@ from ocp.internal import (
     check_intervals,
     check_positive,
     check_whole,
+    refuse_compiled,
     refuse_free_ends,
     refuse_state_bounds,
 )
@@ -91,6 +92,7 @@ class StagewiseNewton(ScalingSolver):
         """Build stages and recursion."""
         check_instance(ocp, OCP, "stagewise Newton: the problem")
         _refuse(ocp)
+        refuse_compiled(ocp, compiled=self.compiled)
         nodes, fast = self.nodes(ocp, self.intervals), self.compiled
         step = NewtonStep.of(ocp, len(nodes) - 1, self.integrator, fast=fast)
         grid = ShootingGrid.of(ocp, nodes, self.integrator, fast=fast)
