@@ -21,6 +21,7 @@ from benchmarks.mpc.fault_problems import arm
 from ocp import MPC, Compiler, ProblemError, Status
 from solvers import Collocation, MultipleShooting
 from solvers.direct.multiple_shooting import MultipleShootingProgram
+from solvers.direct.nlp_backends import CasadiNlp
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
     Outputs,
@@ -321,8 +322,13 @@ class Stuck(SubprocessFunction):
 def stuck(answers: int = 0, *, feasibility_restoration: bool = False) -> MultipleShootingProgram:
     solver = MultipleShooting(10, backend="fatrop", feasibility_restoration=feasibility_restoration)
     program = solver.prepare(cart())
-    own = program.nlp
+    own = casadi_nlp(program)
     return replace(program, nlp=replace(own, subprocess=Stuck(own.function, answers)))
+
+
+def casadi_nlp(program: MultipleShootingProgram) -> CasadiNlp:
+    assert isinstance(program.nlp, CasadiNlp)
+    return program.nlp
 
 
 def test_a_lost_answer_is_a_failure_with_a_reason() -> None:
@@ -372,7 +378,7 @@ def test_a_time_limit_is_a_positive_number(solver: Callable[..., object], limit)
 def test_without_a_limit_fatrop_runs_here() -> None:
     for limit in (None, np.inf):
         solver = MultipleShooting(10, backend="fatrop", time_limit=limit)
-        assert solver.prepare(cart()).nlp.subprocess is None
+        assert casadi_nlp(solver.prepare(cart())).subprocess is None
 
 
 def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -380,5 +386,5 @@ def test_without_fork_there_is_a_warning_and_no_limit(monkeypatch: pytest.Monkey
     solver = MultipleShooting(10, backend="fatrop", time_limit=1.0)
     with pytest.warns(UserWarning, match="time limit of fatrop"):
         program = solver.prepare(cart())
-    assert program.nlp.subprocess is None
+    assert casadi_nlp(program).subprocess is None
     assert program.run().status is Status.SOLVED
