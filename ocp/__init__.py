@@ -11,6 +11,7 @@ from ocp.estimation.estimate import Estimate, estimate
 from ocp.expressions.network import Network
 from ocp.expressions.table import Table
 from ocp.files.archive import whole_arrays
+from ocp.integration.implicit_step import Radau
 from ocp.integration.one_step import RK4, Euler, Integrator, Midpoint
 from ocp.linear.discretise import discretise
 from ocp.linear.stationary import with_stationary_end
@@ -83,6 +84,7 @@ __all__ = [
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Radau",
     "Rate",
     "Record",
     "Replay",

@@ -19,7 +19,7 @@ from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
 from ocp.files.draft import replacing, write_file
 from ocp.integration.differentiable_step import differentiable_step
-from ocp.integration.one_step import Stage, interpolate
+from ocp.integration.one_step import Stage, interpolate, require_explicit
 from ocp.integration.stage_hessian import stage_hessian
 from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
@@ -146,6 +146,7 @@ __all__ = [
     "refuse_in_subprocess",
     "refuse_state_bounds",
     "replacing",
+    "require_explicit",
     "rewriting_of",
     "scaled",
     "segment_gaps",

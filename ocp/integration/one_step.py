@@ -3,11 +3,11 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import casadi as ca
 
 from ocp.checks.arguments import check_whole
+from ocp.checks.errors import UnsupportedProblem
 from ocp.problem.ocp import OCP
 
 # Written for SX; MX does as well, where a control law holds a root finder.
@@ -16,24 +16,16 @@ Rate = Callable[[ca.SX, ca.SX | float], ca.SX]
 
 @dataclass(frozen=True)
 class Integrator(ABC):
-    r"""An explicit one-step method, applied ``steps`` times per interval.
-
-    .. math:: k_i = g(z + a_i h\, k_{i-1}, \; s + a_i h), \qquad z(s + h) = z + h \sum_i b_i k_i
-
-    for dz/ds = g(z, s): each slope needs only the one before it.
+    """A one-step method, applied ``steps`` times per interval.
 
     Args:
         steps: equal substeps in each interval.
-
-    Attributes:
-        order: p of the error O(h^p) over a horizon.
 
     Raises:
         ProblemError: if ``steps`` is not a whole number of at least 1.
     """
 
     steps: int = 1
-    order: ClassVar[int]
 
     def __post_init__(self) -> None:
         """Check the number of substeps."""
@@ -45,6 +37,28 @@ class Integrator(ABC):
         for i in range(self.steps):
             z = self.substep(rate, z, s + i * substep, substep)
         return z
+
+    @property
+    @abstractmethod
+    def order(self) -> int:
+        """P of the error O(h^p) over a horizon."""
+
+    @abstractmethod
+    def substep(self, rate: Rate, z: ca.SX, s: ca.SX | float, h: ca.SX | float) -> ca.SX:
+        """Return z after one substep."""
+
+
+@dataclass(frozen=True)
+class ExplicitIntegrator(Integrator):
+    r"""An explicit method, in which each slope needs only the one before it.
+
+    .. math:: k_i = g(z + a_i h\, k_{i-1}, \; s + a_i h), \qquad z(s + h) = z + h \sum_i b_i k_i
+
+    for dz/ds = g(z, s).
+
+    Args:
+        steps: equal substeps in each interval.
+    """
 
     @property
     @abstractmethod
@@ -61,14 +75,17 @@ class Integrator(ABC):
 
 
 @dataclass(frozen=True)
-class Euler(Integrator):
+class Euler(ExplicitIntegrator):
     """Explicit Euler, z + h g(z, s), order 1: what the thesis' simulations use.
 
     Args:
         steps: equal substeps in each interval.
     """
 
-    order: ClassVar[int] = 1
+    @property
+    def order(self) -> int:
+        """1."""
+        return 1
 
     @property
     def slopes(self) -> tuple[tuple[float, float], ...]:
@@ -77,14 +94,17 @@ class Euler(Integrator):
 
 
 @dataclass(frozen=True)
-class Midpoint(Integrator):
+class Midpoint(ExplicitIntegrator):
     """Explicit midpoint rule, z + h g(z + h k_1/2, s + h/2), order 2.
 
     Args:
         steps: equal substeps in each interval.
     """
 
-    order: ClassVar[int] = 2
+    @property
+    def order(self) -> int:
+        """2."""
+        return 2
 
     @property
     def slopes(self) -> tuple[tuple[float, float], ...]:
@@ -93,14 +113,17 @@ class Midpoint(Integrator):
 
 
 @dataclass(frozen=True)
-class RK4(Integrator):
+class RK4(ExplicitIntegrator):
     """The classical Runge-Kutta method, z + h (k_1 + 2 k_2 + 2 k_3 + k_4)/6, order 4.
 
     Args:
         steps: equal substeps in each interval.
     """
 
-    order: ClassVar[int] = 4
+    @property
+    def order(self) -> int:
+        """4."""
+        return 4
 
     @property
     def slopes(self) -> tuple[tuple[float, float], ...]:
@@ -142,6 +165,20 @@ class Stage:
             step=ca.Function("step", inputs, [after, cost], names, ["x_next", "cost"]),
             adjoint=ca.Function("adjoint", [costate, *inputs], gradients),
         )
+
+
+def require_explicit(ocp: OCP, integrator: Integrator, method: str) -> ExplicitIntegrator:
+    """Return an integrator whose slopes are known one by one.
+
+    Raises:
+        UnsupportedProblem: if it is none.
+    """
+    if not isinstance(integrator, ExplicitIntegrator):
+        raise UnsupportedProblem(
+            f"{ocp.name}: {method} takes explicit integrators, not {type(integrator).__name__}; "
+            "take MultipleShooting with ipopt or fatrop, or Collocation"
+        )
+    return integrator
 
 
 def _one_step(ocp: OCP, integrator: Integrator, s: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX]:

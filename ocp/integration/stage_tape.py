@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from ocp.integration.one_step import Integrator
+from ocp.integration.one_step import ExplicitIntegrator, Integrator, require_explicit
 from ocp.problem.ocp import OCP
 
 
@@ -133,9 +133,10 @@ class StageTape:
         if ocp.model.is_discrete:  # one step, whose slope is the next state itself
             visit, end = _visit(slope, given, begin, 0.0, reach=0.0, weight=1.0)
             return cls(slope, end, ((visit,),))
+        explicit = require_explicit(ocp, integrator, "a method that differentiates slope by slope")
         substeps, end = [], begin
         for i in range(integrator.steps):
-            visits, end = _substep(slope, given, end, integrator, i)
+            visits, end = _substep(slope, given, end, explicit, i)
             substeps.append(visits)
         return cls(slope, end, tuple(substeps))
 
@@ -164,7 +165,7 @@ class StageTape:
 
 
 def _substep(
-    slope: Slope, given: StageInputs, begin: Progress, integrator: Integrator, i: int
+    slope: Slope, given: StageInputs, begin: Progress, integrator: ExplicitIntegrator, i: int
 ) -> tuple[tuple[_Visit, ...], Progress]:
     """Walk through one substep of a continuous-time model."""
     end, before, visits = begin, begin, []

@@ -9,7 +9,7 @@ import numpy as np
 from ocp.checks.arguments import check_instance
 from ocp.codegen.compile import compiled
 from ocp.integration.differentiable_step import differentiable_step
-from ocp.integration.one_step import Integrator, Stage
+from ocp.integration.one_step import ExplicitIntegrator, Integrator, Stage
 from ocp.nlp.start_slope import start_slope, step_with_fixed_start
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, depends_on
@@ -122,9 +122,9 @@ class Transcription:
     @cached_property
     def step(self) -> ca.Function:
         """One interval: (x, u, t, h, p0, p1) -> (x after it, cost), ``Stage.step``."""
-        if self.compiled:
+        if self.compiled and isinstance(self.integrator, ExplicitIntegrator):
             return self._fast(differentiable_step(self.ocp, self.integrator))
-        return Stage.of(self.ocp, self.integrator, held=True).step
+        return self._fast(Stage.of(self.ocp, self.integrator, held=True).step)
 
     @cached_property
     def _path(self) -> ca.Function:

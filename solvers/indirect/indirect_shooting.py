@@ -30,6 +30,7 @@ from ocp.internal import (
     number_of,
     refuse_compiled,
     refuse_state_bounds,
+    require_explicit,
 )
 from solvers.indirect.boundary_value_problem import ExtremalProblem
 from solvers.indirect.continuation import HorizonContinuation, ParameterContinuation, advanced
@@ -113,6 +114,7 @@ class IndirectShooting(ScalingSolver):
             )
         refuse_state_bounds(ocp, "indirect shooting")
         refuse_compiled(ocp, compiled=self.compiled)
+        require_explicit(ocp, self.integrator, "indirect shooting")
         if self.continuation:
             self.continuation.check(ocp)
         per_segment = -(-number_of(self.steps) // self.segments)

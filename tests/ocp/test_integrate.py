@@ -1,11 +1,25 @@
 """Integrators by their measured order, stages by finite differences."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ocp import RK4, Euler, Integrator, Midpoint, ProblemError
+from ocp import (
+    OCP,
+    RK4,
+    Euler,
+    Integrator,
+    Midpoint,
+    Model,
+    ProblemError,
+    Radau,
+    UnsupportedProblem,
+    evaluate,
+    solve,
+)
 from ocp.integration.one_step import Stage
+from solvers import Collocation, IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, lag, pendulum
 from tests.tolerances import DERIVATIVE, ORDER, ROUNDING
@@ -38,10 +52,12 @@ def rolled(integrator: Integrator, n: int) -> np.ndarray:
     return np.append(np.array(x).ravel(), cost)
 
 
-@pytest.mark.parametrize("integrator", [Euler(), Midpoint(), RK4()], ids=repr)
+@pytest.mark.parametrize(
+    "integrator", [Euler(), Midpoint(), RK4(), Radau(stages=1), Radau(stages=2)], ids=repr
+)
 def test_order(integrator: Integrator) -> None:
     exact = reference()
-    counts = np.array([16, 32, 64])
+    counts = np.array([8, 16, 32]) if isinstance(integrator, Radau) else np.array([16, 32, 64])
     errors = [np.abs(rolled(integrator, n) - exact).max() for n in counts]
     slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert slope == pytest.approx(integrator.order, abs=ORDER)
@@ -57,7 +73,7 @@ def test_refuses_no_steps() -> None:
         RK4(steps=0)
 
 
-@pytest.mark.parametrize("integrator", [Euler(), Midpoint(2), RK4()], ids=repr)
+@pytest.mark.parametrize("integrator", [Euler(), Midpoint(2), RK4(), Radau(2, stages=3)], ids=repr)
 @pytest.mark.parametrize("held", [True, False])
 def test_adjoint_is_the_derivative_of_the_step(integrator: Integrator, held: bool) -> None:
     stage = Stage.of(pendulum(), integrator, held=held)
@@ -85,3 +101,54 @@ def test_a_discrete_step_knows_no_h() -> None:
         assert (float(x), float(cost)) == (0.5 * 2.0 + 3.0, 2.0**2 + 3.0**2)
     before, slope = stage.adjoint(5.0, 2.0, 3.0, 0.0, 0.1, none, none)
     assert (float(before), float(slope)) == (2 * 2.0 + 0.5 * 5.0, 2 * 3.0 + 5.0)
+
+
+def stiff() -> OCP:
+    """Van der Pol's oscillator, whose speed dies out in 7 ms: for RK4 steps of 50 ms are long."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    f = ca.vertcat(x[1], 50 * (1 - x[0] ** 2) * x[1] - x[0] + u)
+    model = Model(name="relaxation", x=x, u=u, f=f)
+    return OCP(name="stiff", model=model, x0=[2, 0], horizon=1.0, running_cost=ca.sumsqr(x) + u**2)
+
+
+def test_stiff_dynamics_are_shot_as_they_are_collocated() -> None:
+    """The stages of Radau IIA are the points of collocation."""
+    collocated = solve(stiff(), Collocation(20, degree=3)).or_raise()
+    for solver in (
+        MultipleShooting(20, integrator=Radau()),
+        MultipleShooting(20, integrator=Radau(), backend="fatrop"),
+        MultipleShooting(20, integrator=Radau(), compiled=True),
+        Schuetz(intervals=20, integrator=Radau()),
+    ):
+        shot = solve(stiff(), solver)
+        assert shot.status.is_success, shot.message
+        assert abs(evaluate(shot).cost - collocated.cost) < 1e-4
+
+
+def test_a_lag_is_damped_at_any_step() -> None:
+    """L-stable: what is infinitely fast is gone after one step."""
+    for stages in (1, 2, 3, 4, 5):
+        after = Radau(stages=stages)(lambda z, s: -1e9 * z, ca.SX(1.0), 0.0, 1.0)
+        assert abs(float(after)) < 1e-6
+
+
+def test_linear_dynamics_need_no_root() -> None:
+    z = ca.SX.sym("z", 2)
+    after = Radau()(lambda y, s: ca.vertcat(y[1], -4 * y[0]) + s, z, 0.0, 0.1)
+    assert "root" not in str(after)
+
+
+def test_what_needs_the_slopes_one_by_one_refuses_it() -> None:
+    for solver in (
+        StagewiseNewton(20, integrator=Radau()),
+        IndirectShooting(integrator=Radau()),
+        MultipleShooting(20, integrator=Radau(), backend="native"),
+    ):
+        with pytest.raises(UnsupportedProblem, match="explicit integrators, not Radau"):
+            solver.build(pendulum())
+
+
+@pytest.mark.parametrize("stages", [0, 6, 1.5, "two"])
+def test_refuses_other_numbers_of_stages(stages: object) -> None:
+    with pytest.raises(ProblemError, match="stages"):
+        Radau(stages=stages)  # pyright: ignore[reportArgumentType]

@@ -26,6 +26,7 @@ from ocp.internal import (
     check_instance,
     check_positive,
     check_whole,
+    require_explicit,
 )
 from solvers.indirect.newton_iteration import NewtonResult, Solve, newton
 from solvers.indirect.reverse.chart import Chart
@@ -97,6 +98,7 @@ class ReverseShooting(MethodSolver):
         """Derive the canonical flow and the conditions at both ends."""
         check_instance(ocp, OCP, "reverse shooting: the problem")
         refuse_what_reverse_cannot(ocp)
+        require_explicit(ocp, self.integrator, "reverse shooting")
         if self.boundary == 4 and ocp.has_free_start:
             raise UnsupportedProblem(
                 f"{ocp.name}: its start is free ('{ocp.at('initial')[0].name}'), which is "
