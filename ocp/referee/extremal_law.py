@@ -46,7 +46,8 @@ def extremal_law(ocp: OCP) -> ExtremalLaw:
     own = ca.vertcat(given, kind.zeros(inner.p.numel() - count))
     u, price = conditions.control(z[:nx], z[nx:], t, own), kind(0)
     if form is not None:
-        price = ca.dot(ca.DM(ocp.control_rates.weight), u[form.rates.tolist()] ** 2)
+        if len(form.rates):  # of a scalar, no entries are a row without columns
+            price = ca.dot(ca.DM(ocp.control_rates.weight), u[form.rates.tolist()] ** 2)
         u = ca.vertcat(z[:nx], u)[form.controls.tolist()]
     flow = conditions.flow(z, t, own)
     return ExtremalLaw(

@@ -19,7 +19,7 @@ from ocp import (
     solve,
 )
 from ocp.integration.one_step import Stage
-from solvers import Collocation, IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
+from solvers import Collocation, IndirectShooting, MultipleShooting, StagewiseNewton
 from tests.ocp.differences import gradient
 from tests.ocp.problems import DURATION, lag, pendulum
 from tests.tolerances import DERIVATIVE, ORDER, ROUNDING
@@ -118,7 +118,6 @@ def test_stiff_dynamics_are_shot_as_they_are_collocated() -> None:
         MultipleShooting(20, integrator=Radau()),
         MultipleShooting(20, integrator=Radau(), backend="fatrop"),
         MultipleShooting(20, integrator=Radau(), compiled=True),
-        Schuetz(intervals=20, integrator=Radau()),
     ):
         shot = solve(stiff(), solver)
         assert shot.status.is_success, shot.message
