@@ -1,11 +1,13 @@
 """Solving from many starts: the distinct local optima they lead to."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 
-from ocp import OCP, Guess, ProblemError, Solution, Solver, evaluate
+from ocp import OCP, Guess, Phases, PhasesSolution, ProblemError, Solution, Solver, evaluate
 from ocp.internal import check_instance, check_not_negative, check_positive, check_whole
 from solvers.indirect.indirect_shooting import IndirectShooting
 
@@ -14,8 +16,12 @@ _SAME_COST = 1e-4
 _SAME_STATES = 0.05
 
 
+#: A solution, of a problem or of phases.
+S = TypeVar("S", Solution, PhasesSolution)
+
+
 @dataclass(frozen=True, eq=False)
-class LocalOptimum:
+class LocalOptimum(Generic[S]):
     """One of the optima found.
 
     Attributes:
@@ -24,11 +30,12 @@ class LocalOptimum:
         found: how many starts ended in it.
     """
 
-    solution: Solution
+    solution: S
     cost: float
     found: int
 
 
+@overload
 def multistart(
     ocp: OCP,
     solver: Solver,
@@ -37,13 +44,36 @@ def multistart(
     *,
     amplitude: float = 3.0,
     violation: float = 1e-4,
-) -> tuple[LocalOptimum, ...]:
+) -> tuple[LocalOptimum[Solution], ...]: ...
+
+
+@overload
+def multistart(
+    ocp: Phases,
+    solver: Solver,
+    starts: int,
+    seed: int,
+    *,
+    amplitude: float = 3.0,
+    violation: float = 1e-4,
+) -> tuple[LocalOptimum[PhasesSolution], ...]: ...
+
+
+def multistart(
+    ocp: OCP | Phases,
+    solver: Solver,
+    starts: int,
+    seed: int,
+    *,
+    amplitude: float = 3.0,
+    violation: float = 1e-4,
+) -> tuple[LocalOptimum[Any], ...]:
     """Solve from several starts and return the distinct local optima, best first.
 
-    The first start is the problem's own; the others are ``random_guesses``.
+    The first start is the problem's own; the others are ``random_guesses``, of phases for each.
 
     Args:
-        ocp: the problem; built once.
+        ocp: the problem, or ``Phases``; built once.
         solver: any solver that starts from controls: not indirect shooting.
         starts: how many, the problem's own included.
         seed: of the random controls; the same seed gives the same starts.
@@ -58,7 +88,7 @@ def multistart(
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
     """
-    check_instance(ocp, OCP, "multistart: ocp")
+    check_instance(ocp, (OCP, Phases), "multistart: ocp")
     check_instance(solver, Solver, "multistart: solver")
     check_whole(starts, "multistart: starts")
     check_whole(seed, "multistart: seed", least=0)
@@ -67,10 +97,10 @@ def multistart(
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
     started = perf_counter()
-    program = solver.build(ocp)
+    program = ocp.built_by(solver) if isinstance(ocp, Phases) else solver.build(ocp)
     build_time = perf_counter() - started
-    guesses = [None, *random_guesses(ocp, starts - 1, seed, amplitude)]
-    found: list[LocalOptimum] = []
+    guesses = [None, *_guesses(ocp, starts - 1, seed, amplitude)]
+    found: list[LocalOptimum[Any]] = []
     for guess in guesses:
         solution = program.run(guess=guess).with_(build_time=build_time)
         if not solution.status.is_success:
@@ -107,6 +137,14 @@ def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> 
     return [Guess(u=waves.T @ shape, unknowns=_random_unknowns(ocp, rng)) for shape in shapes]
 
 
+def _guesses(ocp: OCP | Phases, number: int, seed: int, amplitude: float) -> Sequence[Any]:
+    """Return random guesses, of phases one for each with a seed of its own."""
+    if isinstance(ocp, OCP):
+        return random_guesses(ocp, number, seed, amplitude)
+    each = [random_guesses(p, number, seed + i, amplitude) for i, p in enumerate(ocp.phases)]
+    return list(zip(*each, strict=True))
+
+
 def _random_unknowns(ocp: OCP, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Return values of the unknown constants: between two bounds, else around the guess."""
     found = {}
@@ -118,15 +156,20 @@ def _random_unknowns(ocp: OCP, rng: np.random.Generator) -> dict[str, np.ndarray
     return found
 
 
-def _is_same(one: LocalOptimum, other: LocalOptimum) -> bool:
+def _is_same(one: LocalOptimum[Any], other: LocalOptimum[Any]) -> bool:
     """Whether cost and states agree: a mirror image has the same cost."""
     if abs(one.cost - other.cost) > _SAME_COST * (1.0 + abs(one.cost)):
         return False
-    size = 1.0 + np.abs(one.solution.x).max()
-    return bool(one.solution.states_apart(other.solution) <= _SAME_STATES * size)
+    here, there = _all_states(one.solution), _all_states(other.solution)
+    size = 1.0 + np.abs(here.x).max()
+    return bool(here.states_apart(there) <= _SAME_STATES * size)
 
 
-def _merged(found: list[LocalOptimum], new: LocalOptimum) -> list[LocalOptimum]:
+def _all_states(solution: Solution | PhasesSolution) -> Solution:
+    return solution.whole if isinstance(solution, PhasesSolution) else solution
+
+
+def _merged(found: list[LocalOptimum[Any]], new: LocalOptimum[Any]) -> list[LocalOptimum[Any]]:
     for i, old in enumerate(found):
         if _is_same(old, new):
             better = min(old, new, key=lambda optimum: optimum.cost)

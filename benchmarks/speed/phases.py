@@ -206,19 +206,19 @@ def compared(chain: Phases, intervals: int, runs: int = 5) -> Comparison:
     started = process_time()
     by_hand = ByHand(chain, intervals)
     builds = np.array([built, process_time() - started])
-    times, costs = [], []
+    times, costs = [], (0.0, 0.0)
     for _ in range(runs + 1):
         started = process_time()
         found = program.run(guess=guess).or_raise()
         middle = process_time()
-        costs.append((found.cost, by_hand.run()))
+        costs = found.cost, by_hand.run()
         times.append((middle - started, process_time() - middle))
     runs_alone = np.median(times[1:], axis=0)
     # Opti sets up its backend at the first run.
     builds += np.array(times[0]) - runs_alone
     return Comparison(
         chain.name,
-        *costs[-1],
+        *costs,
         (float(builds[0]), float(builds[1])),
         (float(runs_alone[0]), float(runs_alone[1])),
     )

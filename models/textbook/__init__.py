@@ -33,6 +33,7 @@ from models.textbook.oscillators import hypersensitive, rayleigh, rayleigh_const
 from models.textbook.pendulum import pendulum_minimum_time, pendulum_swing_up
 from models.textbook.polar_arm import polar_arm
 from models.textbook.reactors import catalyst_mixing, two_catalysts
+from models.textbook.staged_ascent import staged_ascent
 from models.textbook.state_constrained_mass import beam, breakwell, bryson_denham
 from models.textbook.tangent_steering import linear_tangent_steering
 from models.textbook.two_link_arm import two_link_arm_energy, two_link_arm_minimum_time
@@ -73,6 +74,7 @@ __all__ = [
     "polar_arm",
     "rayleigh",
     "rayleigh_constrained",
+    "staged_ascent",
     "turnpike",
     "two_catalysts",
     "two_link_arm_energy",

@@ -59,14 +59,15 @@ class Chain(Portable):
 
     @cached_property
     def couplings(self) -> tuple[LinkRows, ...]:
-        """The links as rows; of a cycle the last leads from the last phase to the first."""
+        """The links that decide something, as rows; the last of a cycle leads to the first phase."""
         each, count = list(enumerate(self.phases)), len(self.phases)
         links = self.links or (Link(),) * (count - 1)
         shared = ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.unknowns])
-        return tuple(
+        every = [
             link_rows(self.name, link, each[i], each[(i + 1) % count], shared)
             for i, link in enumerate(links)
-        )
+        ]
+        return tuple(rows for rows in every if rows.decided)
 
     @cached_property
     def start_is_linked(self) -> tuple[np.ndarray, ...]:

@@ -55,6 +55,9 @@ def _judged(solution: PhasesSolution, accuracy: float, slack: float) -> PhasesSo
 
 def _failed(solution: PhasesSolution) -> PhasesSolution:
     """Say in terms of the phases what the method could not meet."""
+    for name, duration in zip(solution.problem.names, solution.durations, strict=True):
+        if duration <= 0.0:  # of a method that does not impose bounds
+            return solution.with_(message=f"the duration of phase '{name}' is {duration:.3g} s")
     amount, said = most_violated_phase(solution.side, solution.whole)
     if amount > _VIOLATED:
         return solution.with_(message=said)
@@ -75,6 +78,8 @@ def _cost_fault(solution: PhasesSolution, accuracy: float) -> str:
 def _link_fault(solution: PhasesSolution, accuracy: float, slack: float) -> str:
     """Return which link is missed; empty where none is."""
     side, whole = solution.side, solution.whole
+    if not side.chain.couplings:
+        return ""
     sizes = np.max(
         [np.abs(np.concatenate(link_values(side, whole, x, whole.x[0]))) for x in whole.x], axis=0
     )

@@ -81,7 +81,8 @@ def missed_links(
     for lane, verdict in zip(side.lanes, verdicts, strict=True):
         reached = verdict.truth.x[-1]
         end[lane.x.start : lane.x.start + len(reached)] = reached
-    return link_values(side, whole, end, start)
+    rows = link_values(side, whole, end, start)
+    return tuple(np.where(np.isnan(missed), np.inf, missed) for missed in rows)
 
 
 def link_values(
@@ -114,7 +115,7 @@ def _worth(
         slope = np.array(function(whole.x[-1], 1.0, p)[1])
         costate = phases[coupling.after].costate[0, list(coupling.decided)]
         nu = np.linalg.lstsq(slope.T, costate, rcond=None)[0]
-        total += abs(float(nu @ missed))
+        total += abs(float(nu @ missed)) if np.isfinite(missed).all() else np.inf
     return total
 
 

@@ -23,7 +23,7 @@ from ocp import (
     evaluate,
     solve,
 )
-from solvers import Collocation, IndirectShooting, MultipleShooting, certify, polish
+from solvers import Collocation, IndirectShooting, MultipleShooting, certify, multistart, polish
 from tests.phases.problems import BALL, FALL, RISE, U, V, hop, phase
 
 FOUND = solve(hop(), Collocation(6)).or_raise()
@@ -91,6 +91,13 @@ def test_each_phase_may_have_a_guess_of_its_own():
     guessed = replace(FALL, guess=given[0])
     own = MultipleShooting(10, max_iterations=1).build(hop(phases=(guessed, RISE))).run()
     assert own.durations == pytest.approx(program.run(guess=given).durations)
+
+
+def test_many_starts_find_the_same_hop():
+    found = multistart(hop(), MultipleShooting(6), 3, seed=1)
+    assert len(found) == 1
+    assert found[0].found >= 2
+    assert found[0].solution.durations.sum() == pytest.approx(1.5)
 
 
 def test_the_shortest_way_is_full_push_and_full_brake():

@@ -299,3 +299,30 @@ def test_a_reset_may_depend_on_time_and_parameters():
     assert program.run().cost == pytest.approx(same.cost, rel=1e-9)
     harder = program.run(parameters={"lost": 0.5}).or_raise()
     assert harder.phases[1].x[0, 1] == pytest.approx(-0.5 * harder.phases[0].x[-1, 1])
+
+
+def test_phases_that_share_nothing_but_time():
+    """Each goes its own way from its own start; the total time is shared out between them."""
+    near, far = (
+        phase(
+            name,
+            model=replace(BALL, f=ca.vertcat(V, U)),
+            x0=[0, 0],
+            constraints=(Constraint("end", BALL.x, [d, 0], [d, 0], at="terminal"),),
+        )
+        for name, d in (("near", 1), ("far", 8))
+    )
+    found = solve(Phases("two ways", (near, far), (Link(states=()),), total=3.0), Collocation(8))
+    # 6 d^2/T^3 each: durations are as the square roots of the distances.
+    ratio = np.sqrt(8.0)
+    assert found.durations == pytest.approx([3 / (1 + ratio), 3 * ratio / (1 + ratio)], abs=1e-5)
+    assert evaluate(found).violation < 1e-7
+
+
+def test_a_state_that_blows_up_is_judged_and_not_raised():
+    wild = replace(FALL, name="wild", model=replace(BALL, f=ca.vertcat(V, V**3 + U)), x0=[1.0, 3.0])
+    failed = solve(hop(phases=(wild, RISE)), MultipleShooting(5, max_iterations=1))
+    assert not failed.status.is_success
+    verdict = evaluate(failed)
+    assert verdict.cost == np.inf or verdict.violation > 0.0
+    assert not np.isnan([verdict.cost, verdict.cost_error, verdict.violation]).any()
