@@ -117,14 +117,18 @@ UNCONSTRAINED = [
 ]
 
 
+def _takes_long(solver: Solver) -> bool:
+    return isinstance(solver, IndirectShooting) or "compiled=True" in repr(solver)
+
+
 def every(solvers: list[Any]) -> list[Any]:
-    """Return every problem with every solver; to compile the larger table takes its time."""
+    """Return every problem with every solver; the larger table takes its time."""
     return [
         pytest.param(
             name,
             solver,
             id=f"{name}-{solver}",
-            marks=[pytest.mark.slow] * (name == "surface" and "compiled=True" in repr(solver)),
+            marks=[pytest.mark.slow] * (name == "surface" and _takes_long(solver)),
         )
         for name in PROBLEMS
         for solver in solvers
@@ -149,7 +153,7 @@ def test_a_method_without_constraints_as_well(name: str, solver: Solver) -> None
     assert found.cost == pytest.approx(expected.cost, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", ["table", pytest.param("surface", marks=pytest.mark.slow)])
 def test_direct_and_indirect_agree_on_cost_and_costates(name: str) -> None:
     direct = solve(PROBLEMS[name][0], Collocation(20))
     exact = polish(direct)
