@@ -122,9 +122,7 @@ def test_a_control_loop_acts_as_with_ipopt() -> None:
     ocp = cart_pole_upright()
     start = np.array([0.0, np.pi - 0.3, 0.0, 0.0])
     loops = [
-        MPC(ocp=ocp, solver=replace(solver, intervals=10), dt=0.1, compiled=False).run(
-            Plant(ocp=ocp), start, 0.3
-        )
+        MPC(ocp=ocp, solver=solver, dt=0.05, compiled=False).run(Plant(ocp=ocp), start, 0.15)
         for solver in (NATIVE, IPOPT)
     ]
     assert set(loops[0].sources) == {InputSource.OPTIMAL}
