@@ -53,14 +53,14 @@ class MultipleShooting(BlockingSolver):
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
             interval is halved; a solution beyond it is ``INACCURATE``.
-        verbose: let the backend print.
+        verbose: let the backend print; the native one prints nothing.
         compiled: run the stages as machine code; the first build takes seconds, see ``compiled``.
         time_limit: for each run of the backend, of which a solve may take some [s]: other first
             iterates are not tried once it has passed; inf:
-            unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT returns its iterate,
-            ``TIME_LIMIT``. fatrop may never return from a problem that cannot be solved; with a
-            limit it runs in a process of its own, and a process that is ended returns no iterate:
-            ``FAILED``.
+            unlimited; None: unlimited, but 10 s in ``MPC``. IPOPT and the native backend return
+            their iterate, ``TIME_LIMIT``. fatrop may never return from a problem that cannot be
+            solved; with a limit it runs in a process of its own, and a process that is ended
+            returns no iterate: ``FAILED``.
         feasibility_restoration: after a failure, find the trajectory that violates the
             constraints least: it tells whether the problem is infeasible, and is a better first
             iterate if it is not; after that, try other first iterates. Each may cost 300

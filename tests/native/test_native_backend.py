@@ -2,13 +2,17 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from ocp import OCP, Guess, Status, UnsupportedProblem, evaluate, solve
+from benchmarks.cases import all_cases
+from models import cart_pole_upright
+from ocp import MPC, OCP, Guess, InputSource, Plant, Status, UnsupportedProblem, evaluate, solve
 from ocp.codegen.compile import Compiler
 from ocp.internal import Transcription
 from solvers import MultipleShooting
+from solvers.direct.native import lane_code
 from solvers.direct.native.native_library import NativeLibrary
 from solvers.direct.native.stage_code import StageCode
 from tests.native.problems import (
@@ -106,3 +110,34 @@ def test_the_optimum_costs_the_same_in_machine_code_of_another_horizon() -> None
     for n in (5, 40):
         native, ipopt = (solve(ocp, replace(s, intervals=n)) for s in (NATIVE, IPOPT))
         assert native.or_raise().cost == pytest.approx(ipopt.or_raise().cost, rel=SAME_OPTIMUM)
+
+
+def test_a_mistake_of_the_compiler_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(lane_code._OPERATORS, ca.OP_SIN, "lanes_cos({0})")
+    with pytest.raises(UnsupportedProblem, match="gives other numbers than CasADi"):
+        NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
+
+
+def test_a_control_loop_acts_as_with_ipopt() -> None:
+    ocp = cart_pole_upright()
+    start = np.array([0.0, np.pi - 0.3, 0.0, 0.0])
+    loops = [
+        MPC(ocp=ocp, solver=solver, dt=0.05, compiled=False).run(Plant(ocp=ocp), start, 0.15)
+        for solver in (NATIVE, IPOPT)
+    ]
+    assert set(loops[0].sources) == {InputSource.OPTIMAL}
+    np.testing.assert_allclose(loops[0].x, loops[1].x, atol=1e-5)
+
+
+# What ends elsewhere, at 20 intervals: another local minimum, or no success of either.
+ELSEWHERE = ("hypersensitive", "linear-hypersensitive")
+LIBRARY = [case for case in all_cases() if case.name not in ELSEWHERE]
+LIBRARY = [case for case in LIBRARY if not case.name.startswith("arm-")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
+def test_it_finds_the_optimum_of_ipopt_in_the_library(case) -> None:
+    native, ipopt = (solve(case.build(), solver) for solver in (NATIVE, IPOPT))
+    assert native.status is ipopt.status
+    assert native.cost == pytest.approx(ipopt.cost, rel=1e-6, abs=1e-6)

@@ -69,10 +69,23 @@ def _write(function: ca.Function, problem: str, written: dict[str, str]) -> None
     for each in called:
         if each.name() not in written:
             _write(each, problem, written)
-    body = "\n".join(f"  {line}" for line in _lines(function, called, problem))
-    names = ", ".join(f"a{i}" for i in range(max(1, function.sz_w())))
-    head = f"static void {function.name()}(const V *in, V *out) {{"
-    written[function.name()] = f"{head}\n  V {names};\n{body}\n}}\n"
+    head = [f"static void {function.name()}(const V *in, V *out) {{", "(void)in, (void)out;"]
+    lines = [*head, *_variables(function), *_lines(function, called, problem)]
+    written[function.name()] = "\n  ".join(lines) + "\n}\n"
+
+
+def _variables(function: ca.Function) -> Iterator[str]:
+    """Yield their declaration, if there are any."""
+    count = function.n_instructions()
+    made = {
+        place
+        for k in range(count)
+        if function.instruction_id(k) != ca.OP_OUTPUT
+        for place in function.instruction_output(k)
+        if place >= 0
+    }
+    if made:
+        yield f"V {', '.join(f'a{i}' for i in sorted(made))};"
 
 
 def _lines(function: ca.Function, called: list[ca.Function], problem: str) -> Iterator[str]:

@@ -12,6 +12,8 @@ from ocp.internal import Unbuildable, built_library
 from solvers.direct.native.stage_code import StageCode
 
 _LINE = 64  # bytes that memory is aligned to
+# By how much compiled derivatives may differ, relative to 1 + abs(value), and at how many points.
+_SAME, _PROBES = 1e-6, 2
 _REPORT = 12  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
 _NOTED = 512  # iterations of which something is noted
@@ -125,7 +127,42 @@ class NativeLibrary:
         library.native_bytes.restype = ctypes.c_size_t
         library.native_evaluate.restype = ctypes.c_double
         library.native_linear_step.argtypes = [ctypes.c_void_p, ctypes.c_double]
-        return cls(code, library)
+        loaded = cls(code, library)
+        loaded._compare_with_casadi()
+        return loaded
+
+    def _compare_with_casadi(self) -> None:
+        """Compare the derivatives of the last stage at a few points: compilers make mistakes.
+
+        Raises:
+            UnsupportedProblem: if they differ by more than rounding.
+        """
+        at, rng, code = self.arrays, np.random.default_rng(0), self.code
+        full = next(f for f in code.functions if f.name() == "stage_full")
+        for _ in range(_PROBES):
+            for array in (at.x, at.u, at.data, at.costate, at.y):
+                array[:] = rng.uniform(0.5, 1.5, size=array.shape)
+            self.evaluate()
+            last = code.flat_size - len(code.bounded) - code.row_counts[2]
+            y = at.y[last - code.row_counts[0] : last]
+            known = full.call([at.x[-2], at.u[-1], at.data[-2], at.costate[-1], y])
+            made = {3: at.slope[-1].T, 4: at.gradient[-2], 6: at.hessian[-2].T}
+            if code.transcription.n == 1:  # rows of the start are added there
+                del made[6]
+            for i, found in made.items():
+                right = np.array(known[i]).reshape(found.shape, order="F")
+                is_known = np.isfinite(right)
+                close = np.abs(found - right) <= _SAME * (1.0 + np.abs(right))
+                if not close[is_known].all():
+                    raise UnsupportedProblem(
+                        f"{code.transcription.ocp.name}: the compiled stage gives other numbers "
+                        "than CasADi: the compiler is at fault; take backend='ipopt'"
+                    )
+        self._clear()
+
+    def _clear(self) -> None:
+        """Lay the memory out again."""
+        self.library.native_set_up(self._block, self.code.transcription.n)
 
     def solve(self, options: NativeOptions) -> int:
         """Solve from what is in the arrays; return how it ended, an ``Ending``.

@@ -1,7 +1,9 @@
 """``NativeSolve``: the native solver between vectors of unknowns and rows of the program."""
 
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,16 @@ ENDINGS = (
     "time limit",
     "diverged",
 )
-
-
 # After these no other way to iterate is tried from the same first iterate.
-_FINAL = ("solved", "time limit")
+_FINAL = ("solved", "iteration limit", "time limit")
+
+
+class _Way(Enum):
+    """How to iterate from a first iterate."""
+
+    WARM = "from the costates of a guess"
+    COLD = "from multipliers that are fitted"
+    MONOTONE = "with a barrier parameter that only falls"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +51,14 @@ class NativeLimits:
     max_iterations: int
     time_limit: float
 
-    def at(self, *, warm: bool, monotone: bool = False) -> NativeOptions:
-        """Return them as the library takes them."""
+    def options(self, way: "_Way", iterations: int, seconds: float) -> NativeOptions:
+        """Return them as the library takes them, after what other ways have used up."""
+        warm, monotone = way is _Way.WARM, way is _Way.MONOTONE
         return NativeOptions(
             tolerance=self.tolerance,
             barrier=_WARM if warm else _COLD,
-            max_iterations=float(self.max_iterations),
-            time_limit=self.time_limit,
+            max_iterations=float(self.max_iterations - iterations),
+            time_limit=self.time_limit - seconds,
             pause=_PAUSE,
             warm=float(warm),
             monotone=float(monotone),
@@ -87,15 +96,19 @@ class NativeSolve:
         at.data[:] = library.code.data(p)
         self._rows.put_bounds(at, bounds)
         library.read_bounds()
+        has_sides = bool(at.has_low.any() or at.has_up.any())
+        skipped = {_Way.WARM: costate is None, _Way.MONOTONE: not has_sides}
         stats: dict[str, Any] = {}
-        for warm, monotone in ((True, False), (False, False), (False, True)):
-            if warm and costate is None:
+        started = perf_counter()
+        for way in _Way:
+            if skipped.get(way):
                 continue
             at.x[:], at.u[:] = tr.split(w0)
-            if warm and costate is not None:
-                at.costate[:] = 0.0
+            at.costate[:] = 0.0
+            if way is _Way.WARM and costate is not None:
                 at.costate[:, : costate.shape[1]] = costate
-            ending = ENDINGS[library.solve(self.limits.at(warm=warm, monotone=monotone))]
+            used = stats.get("iter_count", 0), perf_counter() - started
+            ending = ENDINGS[library.solve(self.limits.options(way, *used))]
             stats = _stats(ending, library.report(), library.notes(), stats)
             if ending in _FINAL:
                 break
