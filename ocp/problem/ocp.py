@@ -507,7 +507,7 @@ class OCP(Portable):
         if model.nz:
             refuse_unsolvable(self.algebraic_solution, self.p, [(x0, u, 0.0, p) for u in controls])
         check_kinks(self.name, self.functions.called, self.smoothness)
-        faults = [fault_at(self, x0, u, p) for u in controls]
+        faults = [fault_at(self.explicit, x0, u, p) for u in controls]
         if all(faults):
             raise ProblemError(f"{self.name}: {faults[0]}; a singular start, or NaN in the data")
 
