@@ -59,7 +59,7 @@ class Chain(Portable):
 
     @cached_property
     def couplings(self) -> tuple[LinkRows, ...]:
-        """The links that decide something, as rows; that of a cycle leads to the first phase."""
+        """Links that decide something, as rows; the last of a cycle leads to the first phase."""
         each, count = list(enumerate(self.phases)), len(self.phases)
         links = self.links or (Link(),) * (count - 1)
         shared = ca.vertcat(ca.SX(0, 1), *[entry.symbol for entry in self.unknowns])

@@ -75,12 +75,12 @@ def test_a_figure_has_all_phases_on_one_clock():
 
 
 def test_a_solution_starts_another_solver_and_another_chain():
-    exact = IndirectShooting(10).build(hop()).run(guess=FOUND)
+    exact = IndirectShooting(5, steps=100).build(hop()).run(guess=FOUND)
     assert exact.status.is_success
     assert exact.iterations <= 4
     longer = MultipleShooting(10).build(hop(total=1.6)).run(guess=FOUND)
     assert longer.status.is_success
-    again = IndirectShooting(10).build(hop()).run(guess=FOUND.phases)
+    again = IndirectShooting(5, steps=100).build(hop()).run(guess=FOUND.phases)
     assert again.cost == pytest.approx(exact.cost, rel=1e-9)
 
 
