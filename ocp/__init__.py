@@ -21,6 +21,7 @@ from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.record_file import records
 from ocp.mpc.record_format import Record
 from ocp.problem.constraint import Box, Constraint, Soft
+from ocp.problem.delay import Delay
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
 from ocp.problem.guess import Guess
@@ -45,6 +46,7 @@ __all__ = [
     "Controller",
     "DamagedFile",
     "Decision",
+    "Delay",
     "Euler",
     "Evaluation",
     "FeedbackLaw",

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import Draft
+from ocp.normal_form.input_delays import add_delays
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.peaks import add_peaks
@@ -31,6 +32,7 @@ class NormalForm(Portable):
         controls: where the own controls stand among its states and controls, (nu,).
         rates: which of its controls are the rates of those that are states, in their order.
         last_input: where the states stand that start at the last input.
+        histories: where the states stand that start at what was sent before, by run argument.
         peaks: where the largest values stand among its states, by name.
     """
 
@@ -43,11 +45,18 @@ class NormalForm(Portable):
     controls: np.ndarray
     rates: np.ndarray
     last_input: slice
+    histories: dict[str, slice]
     peaks: dict[str, slice]
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
         return np.concatenate([x, u], axis=-1)[..., self.controls]
+
+    @property
+    def given(self) -> dict[str, slice]:
+        """Where the run arguments of the original that are starts here stand, by name."""
+        free = self.original.last_input is None
+        return self.histories | ({} if free else {"last_input": self.last_input})
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -64,11 +73,13 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    has_states = ocp.unknowns or ocp.rates or ocp.peaks or ocp.at("integral") or ocp.refers_to_start
-    if not (has_states or is_soft):
+    about_input = ocp.rates or ocp.delays
+    has_states = ocp.unknowns or ocp.peaks or ocp.at("integral") or ocp.refers_to_start
+    if not (has_states or about_input or is_soft):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
+    histories = add_delays(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
     peaks = add_peaks(draft)
@@ -84,5 +95,6 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         controls=draft.own_controls(),
         rates=len(draft.kept) + np.arange(len(draft.moved)),
         last_input=last_input,
+        histories=histories,
         peaks=peaks,
     )

@@ -19,6 +19,7 @@ from ocp.problem.constraint_rows import (
     ProblemRows,
     depends_on,
 )
+from ocp.problem.delay import Delay, check_delays
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
@@ -27,6 +28,7 @@ from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
+    InputHistory,
     LastInput,
     Parameter,
     ParameterValues,
@@ -86,6 +88,7 @@ class OCP(Portable):
         last_input: what the controls that have a ``Rate`` were just before the start, in their
             order in the model (m,): the rate holds from there on. It is a run argument,
             ``run(parameters={"last_input": ...})``; None: the optimiser chooses it.
+        delays: controls that act later than they are sent, in discrete time.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -110,6 +113,7 @@ class OCP(Portable):
     peaks: tuple[Peak, ...] = ()
     rates: tuple[Rate, ...] = ()
     last_input: ArrayLike | None = None
+    delays: tuple[Delay, ...] = ()
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -130,6 +134,7 @@ class OCP(Portable):
         set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
         self._check_horizon()
         check_rates(self.name, self.control_rates, model)
+        check_delays(self.name, model, self.delays)
         last = check_last_input(
             self.name, self.last_input, self.control_rates, model, self.control_bounds
         )
@@ -151,13 +156,14 @@ class OCP(Portable):
         return (*self.given, *self.unknowns, *start)
 
     @cached_property
-    def given(self) -> tuple[Parameter | Signal | LastInput, ...]:
-        """What a run gives by name: parameters and signals, and the last input."""
+    def given(self) -> tuple[Parameter | Signal | InputHistory | LastInput, ...]:
+        """What a run gives by name: parameters and signals, and what was sent before it."""
+        known = (*self.parameters, *(delay.entry() for delay in self.delays))
         if self.last_input is None:
-            return self.parameters
+            return known
         names = [self.model.u_names[i] for i in self.control_rates.index]
         last = ca.vertcat(*[ca.SX.sym(f"last {name}") for name in names])
-        return (*self.parameters, LastInput(last, np.asarray(self.last_input)))
+        return (*known, LastInput(last, np.asarray(self.last_input)))
 
     @property
     def control_rates(self) -> ControlRates:
@@ -406,6 +412,7 @@ class OCP(Portable):
             ("unknowns", Unknown),
             ("peaks", Peak),
             ("rates", Rate),
+            ("delays", Delay),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")

@@ -141,6 +141,22 @@ class LastInput(_Constant):
 
 
 @dataclass(frozen=True, eq=False)
+class InputHistory(_Constant):
+    """What was sent of a control with a ``Delay`` before the start of a run.
+
+    Args:
+        symbol: ``SX`` column (d,).
+        value: as declared, the oldest first (d,).
+        name: the key under which a run takes another one.
+    """
+
+    symbol: ca.SX
+    value: np.ndarray
+    name: str
+    kind: ClassVar[str] = "input history"
+
+
+@dataclass(frozen=True, eq=False)
 class Signal(Portable):
     """A reference sampled over the horizon, at N + 1 equally spaced instants.
 
@@ -209,7 +225,7 @@ class Signal(Portable):
 
 
 # What stands in the vector p of a problem.
-Entry = Parameter | Signal | LastInput | Unknown | StartValue
+Entry = Parameter | Signal | LastInput | InputHistory | Unknown | StartValue
 
 
 @dataclass(frozen=True)
@@ -280,7 +296,7 @@ class ParameterValues:
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""
         each = zip(self.entries, self.values, strict=True)
-        return {e.name: v for e, v in each if isinstance(e, Parameter | Signal | LastInput)}
+        return {e.name: v for e, v in each if not isinstance(e, Unknown | StartValue)}
 
     def named(self, name: str) -> np.ndarray | None:
         """Return the value of one entry; None where there is none of that name."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.interrupts import interruptible
+from ocp.referee.delayed_controls import with_acting_controls
 from ocp.referee.integrate_controls import integrate_controls
 from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
@@ -86,6 +87,7 @@ def evaluate(solution: Solution, *, tolerance: float = _TOLERANCE) -> Evaluation
 
 @remembered
 def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
+    solution = with_acting_controls(solution)
     truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
         return _lost(truth)
