@@ -11,7 +11,7 @@ from ocp.checks.arguments import check_numbers, check_whole
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.checks.expressions import check_symbols
 from ocp.problem.model import Model
-from ocp.problem.parameters import InputHistory
+from ocp.problem.parameters import PastInput
 from ocp.problem.portable import Portable
 
 
@@ -53,10 +53,10 @@ class Delay(Portable):
         """The run argument that is its history."""
         return f"history of {self.control}"
 
-    def entry(self) -> InputHistory:
+    def entry(self) -> PastInput:
         """Return the history as an entry of a run, with new symbols (d,)."""
         past = [ca.SX.sym(f"{self.control}[-{self.steps - k}]") for k in range(self.steps)]
-        return InputHistory(ca.vertcat(*past), np.asarray(self.history), self.name)
+        return PastInput(ca.vertcat(*past), np.asarray(self.history), self.name)
 
     def index(self, model: Model) -> int:
         """Return which control it is."""

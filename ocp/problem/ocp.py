@@ -28,10 +28,9 @@ from ocp.problem.guess import Guess
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
-    InputHistory,
-    LastInput,
     Parameter,
     ParameterValues,
+    PastInput,
     Signal,
     StartValue,
     Unknown,
@@ -156,14 +155,14 @@ class OCP(Portable):
         return (*self.given, *self.unknowns, *start)
 
     @cached_property
-    def given(self) -> tuple[Parameter | Signal | InputHistory | LastInput, ...]:
+    def given(self) -> tuple[Parameter | Signal | PastInput, ...]:
         """What a run gives by name: parameters and signals, and what was sent before it."""
         known = (*self.parameters, *(delay.entry() for delay in self.delays))
         if self.last_input is None:
             return known
         names = [self.model.u_names[i] for i in self.control_rates.index]
         last = ca.vertcat(*[ca.SX.sym(f"last {name}") for name in names])
-        return (*known, LastInput(last, np.asarray(self.last_input)))
+        return (*known, PastInput(last, np.asarray(self.last_input), "last_input"))
 
     @property
     def control_rates(self) -> ControlRates:

@@ -126,34 +126,19 @@ class StartValue(_Constant):
 
 
 @dataclass(frozen=True, eq=False)
-class LastInput(_Constant):
-    """What the controls with a ``Rate`` were before the start of a run.
+class PastInput(_Constant):
+    """What was sent before the start of a run: the last input, or the history of a control.
 
     Args:
         symbol: ``SX`` column (m,).
         value: as declared (m,).
-    """
-
-    symbol: ca.SX
-    value: np.ndarray
-    name: str = "last_input"
-    kind: ClassVar[str] = "last input"
-
-
-@dataclass(frozen=True, eq=False)
-class InputHistory(_Constant):
-    """What was sent of a control with a ``Delay`` before the start of a run.
-
-    Args:
-        symbol: ``SX`` column (d,).
-        value: as declared, the oldest first (d,).
         name: the key under which a run takes another one.
     """
 
     symbol: ca.SX
     value: np.ndarray
     name: str
-    kind: ClassVar[str] = "input history"
+    kind: ClassVar[str] = "past input"
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +210,7 @@ class Signal(Portable):
 
 
 # What stands in the vector p of a problem.
-Entry = Parameter | Signal | LastInput | InputHistory | Unknown | StartValue
+Entry = Parameter | Signal | PastInput | Unknown | StartValue
 
 
 @dataclass(frozen=True)

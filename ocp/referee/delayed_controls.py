@@ -8,7 +8,7 @@ import numpy as np
 from ocp.problem.cache import once_per_problem
 from ocp.problem.constraint import Box
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import InputHistory, Parameter
+from ocp.problem.parameters import Parameter
 from ocp.solution.solution import Solution
 
 
@@ -33,12 +33,9 @@ def _acting(ocp: OCP) -> OCP:
         acting.append(ca.SX.sym(f"{delay.control} that acts"))
         f = ca.substitute(f, delay.control, acting[-1])
     free = Box.unbounded(len(acting))
-    more = tuple(
-        Parameter(e.name, e.symbol, e.value) for e in ocp.given if isinstance(e, InputHistory)
-    )
-    model = replace(
-        m, u=ca.vertcat(m.u, *acting), f=f, u_units=(), u_nominal=None, x_nominal=m.x_nominal
-    )
+    past = {delay.name for delay in ocp.delays}
+    more = tuple(Parameter(e.name, e.symbol, e.value) for e in ocp.given if e.name in past)
+    model = replace(m, u=ca.vertcat(m.u, *acting), f=f, u_units=(), u_nominal=None)
     return replace(
         ocp,
         model=model,
