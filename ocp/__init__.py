@@ -29,6 +29,7 @@ from ocp.phases.phases import Phases
 from ocp.phases.phases_evaluation import PhasesEvaluation
 from ocp.phases.phases_solution import PhasesSolution
 from ocp.problem.constraint import Box, Constraint, Soft
+from ocp.problem.delay import Delay
 from ocp.problem.epigraph import without_kinks
 from ocp.problem.free_time import FreeTime
 from ocp.problem.grid import Grid
@@ -55,6 +56,7 @@ __all__ = [
     "Controller",
     "DamagedFile",
     "Decision",
+    "Delay",
     "Estimate",
     "Euler",
     "Evaluation",

@@ -23,7 +23,11 @@ def _code(section: str) -> str:
 
 SECTIONS = _sections()
 # One answer goes on from another.
-BEFORE = {"... a price and a bound of how fast the input changes?": "... a model in discrete time?"}
+_IN_STEPS = "... a model in discrete time?"
+BEFORE = {
+    "... a price and a bound of how fast the input changes?": _IN_STEPS,
+    "... an input that acts later?": _IN_STEPS,
+}
 
 
 def test_there_are_twenty_answers() -> None:

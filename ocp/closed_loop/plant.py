@@ -64,6 +64,11 @@ class Plant:
                 f"plant: '{entry.name}' of {self.ocp.name} is an unknown constant; a plant needs "
                 "its value, as a Parameter"
             )
+        for delay in self.ocp.delays:
+            raise ProblemError(
+                f"plant: '{delay.control}' of {self.ocp.name} has a Delay; in a loop inputs are "
+                "late by the delay of the controller, MPC(delay=...)"
+            )
         check_whole(self.substeps, "plant: substeps")
         for name in ("disturbance", "parameters"):
             if getattr(self, name) is not None:

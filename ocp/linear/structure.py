@@ -53,6 +53,11 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
     if not ocp.model.nu:
         raise UnsupportedProblem(f"{ocp.name}: the linear solvers need a control, there is none")
     refuse_free_start(ocp, "a linear solver")
+    for delay in ocp.delays:
+        raise UnsupportedProblem(
+            f"{ocp.name}: the Delay of '{delay.control}' is no part of A and B: LinearMPC and "
+            "Riccati take it by themselves; to read matrices, write what was sent as states"
+        )
     for peak in ocp.peaks:
         raise UnsupportedProblem(f"{ocp.name}: the peak of '{peak.name}' is not quadratic")
     for name in ocp.control_rates.names:

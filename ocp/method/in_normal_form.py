@@ -20,8 +20,6 @@ from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess
 
-_LAST = "last_input"
-
 
 @dataclass(frozen=True, eq=False)
 class InNormalForm(Rewriting):
@@ -48,13 +46,14 @@ class InNormalForm(Rewriting):
         start = self.problem.start().copy()
         start[: len(data.x0)] = data.x0
         start[self.form.start] = self.form.copied(data.x0)
-        if (last := data.values.named(_LAST)) is not None:
-            start[self.form.last_input] = last
+        for name, at in self.form.given.items():
+            start[at] = data.values.named(name)
         return start
 
     def parameters(self, given: Mapping[str, ArrayLike] | None) -> Mapping[str, ArrayLike] | None:
-        """Return what is a parameter of the normal form too: the last input is a start there."""
-        return given and {name: value for name, value in given.items() if name != _LAST}
+        """Return what is a parameter of the normal form too: what was sent is a start there."""
+        starts = self.form.given
+        return given and {name: value for name, value in given.items() if name not in starts}
 
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
         """Return a guess with what is added; of a solution all that it knows."""
@@ -71,14 +70,14 @@ class InNormalForm(Rewriting):
         """Return a solution in the terms of the user, which keeps the one in normal form."""
         original, m, form = self.original, self.original.model, self.form
         values = found.data.values
-        last = {} if original.last_input is None else {_LAST: found.x0[form.last_input]}
+        sent = {name: found.x0[at] for name, at in form.given.items()}
         written = found.with_(
             problem=original,
             x=found.x[:, : m.nx],
             x0=found.x0[: m.nx],
             costate=form.costate(found.x, found.costate, found.t, found.fractions, values),
             **own_controls(form, found),
-            parameters={**found.parameters, **last},
+            parameters={**found.parameters, **sent},
             unknowns={name: found.x[0, at] for name, at in form.unknowns.items()},
             normal=found,
         )
@@ -139,7 +138,7 @@ class _Added:
 
     def _states(self, fractions: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the added states: constants, and integrals along the guess."""
-        form, nx = self.form, x.shape[1]
+        form, nx, m = self.form, x.shape[1], self.form.original.model
         whole = np.tile(form.problem.start(), (len(x), 1))
         whole[:, form.start] = form.copied(x[0])
         for name, at in form.unknowns.items():
@@ -150,6 +149,10 @@ class _Added:
             # Of a control that is a state itself; in discrete time of the one before.
             before = u if len(form.rates) else np.vstack([u[:1], u[:-1]])
             whole[:, form.last_input] = before[:, rates.index]
+        for delay in form.original.delays if u is not None else ():
+            past = np.append(whole[0, form.histories[delay.name]], u[:, delay.index(m)])
+            rows = np.lib.stride_tricks.sliding_window_view(past, delay.steps)
+            whole[:, form.histories[delay.name]] = rows[: len(x)]
         if form.peaks and u is not None:
             along = self._along(form.original.functions.peaks, fractions, x, u)
             tops = largest(form.original.peaks, along)

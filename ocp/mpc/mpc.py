@@ -214,6 +214,11 @@ class MPC:
                 f"MPC of {name}: the integral constraint '{integrals[0].name}' would begin anew at "
                 "every step: carry the integral as a state, bounded at the end"
             )
+        if self.ocp.delays:
+            raise UnsupportedProblem(
+                f"MPC of {name}: a loop keeps what is on its way itself: leave the Delay of "
+                f"'{self.ocp.delays[0].control}' out, and say MPC(delay=...) [s]"
+            )
         if self.ocp.rates and self.ocp.last_input is None:
             raise UnsupportedProblem(
                 f"MPC of {name}: the last input is free, here it is what was applied; say what it "

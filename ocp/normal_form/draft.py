@@ -79,6 +79,7 @@ class Draft:
 
     Attributes:
         ocp: as it was written.
+        f: right-hand side of its own states.
         running_cost: of the rewritten problem.
         terminal_cost: of it.
         constraints: of it.
@@ -90,6 +91,7 @@ class Draft:
     """
 
     ocp: OCP
+    f: ca.SX
     running_cost: ca.SX
     terminal_cost: ca.SX
     constraints: list[Constraint]
@@ -103,7 +105,7 @@ class Draft:
     def of(cls, ocp: OCP) -> "Draft":
         """Begin with a problem as it was written."""
         costs = ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)
-        return cls(ocp, *costs, list(ocp.constraints), ocp.smoothness)
+        return cls(ocp, ocp.model.f, *costs, list(ocp.constraints), ocp.smoothness)
 
     def unused(self, name: str) -> str:
         """Return a name that no constraint has."""
@@ -154,6 +156,7 @@ class Draft:
             peaks=(),
             last_input=None,
             data=(),
+            delays=(),
             smoothness=self.smoothness,
             guess=None,
         )
@@ -166,7 +169,7 @@ class Draft:
             m,
             x=ca.vertcat(m.x, *states),
             u=ca.vertcat(m.u[kept, :], *controls),
-            f=ca.vertcat(m.f, *[s.rate for s in self.states]),
+            f=ca.vertcat(self.f, *[s.rate for s in self.states]),
             x_units=(*m.x_units, *[""] * more_x) if m.x_units else (),
             u_units=(*(m.u_units[i] for i in kept), *[""] * more_u) if m.u_units else (),
             x_nominal=np.concatenate([sizes.x, *[s.size for s in self.states]]),

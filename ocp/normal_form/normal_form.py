@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import Draft
+from ocp.normal_form.input_delays import add_delays
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.measurements import DataTerms, add_data
@@ -37,6 +38,7 @@ class NormalForm(Portable):
         rates: which of its controls are the rates of those that are states, in their order.
         last_input: where the states stand that start at the last input.
         data: what measurements at instants have added; None: nothing.
+        histories: where the states stand that start at what was sent before, by run argument.
         peaks: where the largest values stand among its states, by name.
         waypoints: what constraints at instants have added.
     """
@@ -51,6 +53,7 @@ class NormalForm(Portable):
     controls: np.ndarray
     rates: np.ndarray
     last_input: slice
+    histories: dict[str, slice]
     peaks: dict[str, slice]
     data: DataTerms | None
     waypoints: Waypoints
@@ -63,6 +66,12 @@ class NormalForm(Portable):
     def problem(self) -> OCP:
         """The one that methods get: the algebraic variables are solved for."""
         return self.implicit.explicit
+
+    @property
+    def given(self) -> dict[str, slice]:
+        """Where the run arguments of the original that are starts here stand, by name."""
+        free = self.original.last_input is None
+        return self.histories | ({} if free else {"last_input": self.last_input})
 
     def copied(self, x: np.ndarray) -> np.ndarray:
         """Return what the copy of the start is for a state at the start (nx,)."""
@@ -127,13 +136,14 @@ class NormalForm(Portable):
 def normal_form(ocp: OCP) -> NormalForm | None:
     """Return the normal form of a problem; None where it is written in simple terms already."""
     is_soft = any(c.soft is not None for c in ocp.constraints)
-    along = ocp.rates or ocp.peaks or ocp.at("integral")
+    along = ocp.rates or ocp.delays or ocp.peaks or ocp.at("integral")
     at_instants = ocp.data or ocp.at("instants")
     constants = ocp.unknowns or ocp.refers_to_start
     if not (along or at_instants or constants or is_soft or ocp.model.nz):
         return None
     draft = Draft.of(ocp)
     last_input = add_rates(draft)
+    histories = add_delays(draft)
     slacks = soften(draft)
     integrals = add_integrals(draft)
     data, waypoints = add_data(draft), add_waypoints(draft)
@@ -154,5 +164,6 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         last_input=last_input,
         data=data,
         waypoints=waypoints,
+        histories=histories,
         peaks=peaks,
     )

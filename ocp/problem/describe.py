@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint, Soft
+from ocp.problem.delay import Delay
 from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import Parameter, Signal, Steps, Unknown
@@ -74,6 +75,9 @@ class _Problem(Protocol):
     def control_rates(self) -> ControlRates: ...
 
     @property
+    def delays(self) -> tuple[Delay, ...]: ...
+
+    @property
     def last_input(self) -> ArrayLike | None: ...
 
     @property
@@ -119,6 +123,9 @@ def _lines(ocp: _Problem) -> Iterable[str]:
     yield from _bounds(ocp.start_bounds, tuple(f"{n}(0)" for n in m.x_names), m.x_units)
     yield from _bounds(ocp.state_bounds, m.x_names, m.x_units)
     yield from _bounds(ocp.control_bounds, m.u_names, m.u_units)
+    for delay in ocp.delays:
+        history = f"before the start {_vector(delay.history)}"
+        yield f"    {delay.control} acts {_count(delay.steps, 'step')} later   ({history})"
     yield from _rates(ocp)
     for c in ocp.constraints:
         yield from _constraint(c, _place(c))

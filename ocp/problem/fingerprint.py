@@ -69,6 +69,8 @@ def fingerprint(ocp: OCP) -> dict[str, np.ndarray]:
     if ocp.peaks:
         weights = [peak.weight for peak in ocp.peaks]
         parts["peaks"] = np.concatenate([parts["peaks"], weights])
+    if ocp.delays:
+        parts["delays"] = np.array([(d.index(m), d.steps) for d in ocp.delays])
     if len(rates := ocp.control_rates):
         is_given = [ocp.last_input is not None]
         parts["rates"] = np.concatenate([rates.index, _stacked(rates.box), rates.weight, is_given])

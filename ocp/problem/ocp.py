@@ -22,6 +22,7 @@ from ocp.problem.constraint_rows import (
     depends_on,
 )
 from ocp.problem.data_checks import check_data, check_instants
+from ocp.problem.delay import Delay, check_delays
 from ocp.problem.describe import describe
 from ocp.problem.first_evaluation import fault_at, inside
 from ocp.problem.free_time import FreeTime
@@ -31,9 +32,9 @@ from ocp.problem.measurement import Measurement
 from ocp.problem.model import Model
 from ocp.problem.parameters import (
     Entry,
-    LastInput,
     Parameter,
     ParameterValues,
+    PastInput,
     Signal,
     StartValue,
     Steps,
@@ -93,6 +94,7 @@ class OCP(Portable):
             order in the model (m,): the rate holds from there on. It is a run argument,
             ``run(parameters={"last_input": ...})``; None: the optimiser chooses it.
         data: measurements at instants; the cost gains their least squares.
+        delays: controls that act later than they are sent, in discrete time.
         smoothness: 0 the cost has kinks, 1 it is once, 2 twice continuously differentiable.
         guess: where solvers start unless told otherwise.
 
@@ -118,6 +120,7 @@ class OCP(Portable):
     rates: tuple[Rate, ...] = ()
     last_input: ArrayLike | None = None
     data: tuple[Measurement, ...] = ()
+    delays: tuple[Delay, ...] = ()
     smoothness: Literal[0, 1, 2] = 2
     guess: Guess | None = None
 
@@ -138,6 +141,7 @@ class OCP(Portable):
         set_(self, "start_bounds", self.start_bounds.sized(model.nx, f"{self.name}: start_bounds"))
         self._check_horizon()
         check_rates(self.name, self.control_rates, model)
+        check_delays(self.name, model, self.delays)
         last = check_last_input(
             self.name, self.last_input, self.control_rates, model, self.control_bounds
         )
@@ -164,13 +168,14 @@ class OCP(Portable):
         return tuple(e for e in self.parameters if isinstance(e, Signal | Steps))
 
     @cached_property
-    def given(self) -> tuple[Parameter | Signal | Steps | LastInput, ...]:
-        """What a run gives by name: parameters and signals, and the last input."""
+    def given(self) -> tuple[Parameter | Signal | Steps | PastInput, ...]:
+        """What a run gives by name: parameters and signals, and what was sent before it."""
+        known = (*self.parameters, *(delay.entry() for delay in self.delays))
         if self.last_input is None:
-            return self.parameters
+            return known
         names = [self.model.u_names[i] for i in self.control_rates.index]
         last = ca.vertcat(*[ca.SX.sym(f"last {name}") for name in names])
-        return (*self.parameters, LastInput(last, np.asarray(self.last_input)))
+        return (*known, PastInput(last, np.asarray(self.last_input), "last_input"))
 
     @property
     def control_rates(self) -> ControlRates:
@@ -444,6 +449,7 @@ class OCP(Portable):
             ("peaks", Peak),
             ("rates", Rate),
             ("data", Measurement),
+            ("delays", Delay),
         ):
             entries = getattr(self, what)
             check_instance(entries, (tuple, list), f"{self.name}: {what}")

@@ -127,18 +127,19 @@ class StartValue(_Constant):
 
 
 @dataclass(frozen=True, eq=False)
-class LastInput(_Constant):
-    """What the controls with a ``Rate`` were before the start of a run.
+class PastInput(_Constant):
+    """What was sent before the start of a run: the last input, or the history of a control.
 
     Args:
         symbol: ``SX`` column (m,).
         value: as declared (m,).
+        name: the key under which a run takes another one.
     """
 
     symbol: ca.SX
     value: np.ndarray
-    name: str = "last_input"
-    kind: ClassVar[str] = "last input"
+    name: str
+    kind: ClassVar[str] = "past input"
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +242,7 @@ class Steps(Portable):
 
 
 # What stands in the vector p of a problem.
-Entry = Parameter | Signal | Steps | LastInput | Unknown | StartValue
+Entry = Parameter | Signal | Steps | PastInput | Unknown | StartValue
 
 
 @dataclass(frozen=True)
@@ -313,7 +314,7 @@ class ParameterValues:
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""
         each = zip(self.entries, self.values, strict=True)
-        return {e.name: v for e, v in each if isinstance(e, Parameter | Signal | LastInput)}
+        return {e.name: v for e, v in each if not isinstance(e, Unknown | StartValue)}
 
     def named(self, name: str) -> np.ndarray | None:
         """Return the value of one entry; None where there is none of that name."""

@@ -90,6 +90,7 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
         ),
         rates=_rates(ocp, rounded),
         last_input=_last_input(ocp, rounded.u),
+        delays=tuple(delay.per(float(rounded.u[delay.index(m)])) for delay in ocp.delays),
         smoothness=ocp.smoothness,
         original=ocp,
         sizes=rounded,

@@ -10,6 +10,7 @@ from ocp.checks.interrupts import interruptible
 from ocp.expressions.foreign_functions import without_derivatives
 from ocp.normal_form.normal_form import normal_form
 from ocp.problem.end_of_definition import end_of_definition
+from ocp.referee.delayed_controls import with_acting_controls
 from ocp.referee.integrate_controls import integrate_controls
 from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
@@ -107,6 +108,7 @@ def evaluate(
 
 @remembered
 def _evaluation(solution: Solution, tolerance: float) -> Evaluation:
+    solution = with_acting_controls(solution)
     truth = integrate_controls(solution, tolerance=tolerance)
     if not truth.is_finite:
         return _lost(solution, truth)

@@ -198,14 +198,16 @@ class Solution:
     def sensitivity(self) -> dict[str, np.ndarray]:
         """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs.
 
-        Where controls have a ``Rate`` also of their ``"last_input"``; 0 where that is free.
+        Where controls have a ``Rate`` also of their ``"last_input"``, 0 where that is free; with a
+        ``Delay`` of what was sent before.
         """
         form = None if self.normal is None else normal_form(self.problem)
         if form is None or self.normal is None:
             return {}
         costate = self.normal.costate[0]
-        last = {"last_input": costate[form.last_input]} if self.problem.rates else {}
-        return {name: costate[at] for name, at in form.unknowns.items()} | last
+        sent = {"last_input": form.last_input} if self.problem.rates else {}
+        places = form.unknowns | form.histories | sent
+        return {name: costate[at] for name, at in places.items()}
 
     @property
     def peaks(self) -> dict[str, float]:
