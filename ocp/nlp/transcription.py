@@ -228,8 +228,11 @@ class Transcription:
     @property
     def _on_held_controls(self) -> np.ndarray:
         """Which path rows say the same all over a block, bool (m,)."""
-        ocp, count = self.ocp, self.blocks.controls if self.blocks else 0
-        others = ca.vertcat(ocp.model.x, ocp.model.u[count:], ocp.model.t, ocp.p)
+        ocp = self.ocp
+        if self.blocks is None:
+            return np.zeros(len(ocp.rows.path), dtype=bool)
+        others = [ocp.model.x, ocp.model.u[self.blocks.controls :], ocp.model.t, ocp.p]
+        others = ca.vertcat(*map(ca.vec, others))
         return ~depends_on(ocp.rows.path.expression, others)
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:

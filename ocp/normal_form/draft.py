@@ -108,6 +108,11 @@ class Draft:
         self.states.append(added)
         return slice(first, first + added.symbol.numel())
 
+    def add_steps(self, name: str, symbol: ca.SX, inner: np.ndarray, value: np.ndarray) -> None:
+        """Add a constant (m,) that steps at instants, see ``Steps``."""
+        taken = {entry.name for entry in (*self.ocp.parameters, *self.ocp.unknowns, *self.steps)}
+        self.steps.append(Steps(unused(name, taken), symbol, inner, value))
+
     def problem(self) -> OCP:
         """Return the rewritten problem."""
         ocp, m = self.ocp, self.ocp.model
