@@ -69,13 +69,16 @@ class InNormalForm(Rewriting):
     def answer(self, found: Solution) -> Solution:
         """Return a solution in the terms of the user, which keeps the one in normal form."""
         original, m, form = self.original, self.original.model, self.form
-        values = found.data.values
         sent = {name: found.x0[at] for name, at in form.given.items()}
+        costate = found.costate[:, : m.nx]
+        if form.has_jumps:
+            at = (found.t, found.fractions, found.data.values)
+            costate = form.costate(found.x, found.costate, *at)
         written = found.with_(
             problem=original,
             x=found.x[:, : m.nx],
             x0=found.x0[: m.nx],
-            costate=form.costate(found.x, found.costate, found.t, found.fractions, values),
+            costate=costate,
             **own_controls(form, found),
             parameters={**found.parameters, **sent},
             unknowns={name: found.x[0, at] for name, at in form.unknowns.items()},
@@ -84,7 +87,7 @@ class InNormalForm(Rewriting):
         if form.data is None:
             return written
         # Of a sum of squares that is small, two integrals that nearly cancel have few digits.
-        once = form.integrated_data(found.x[-1], found.t[-1], values)
+        once = form.integrated_data(found.x[-1], found.t[-1], found.data.values)
         return written.with_(cost=found.cost - once + data_cost(written.residuals))
 
     def written(self, solution: Solution) -> Solution:

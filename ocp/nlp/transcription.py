@@ -10,9 +10,10 @@ from ocp.checks.arguments import check_instance
 from ocp.codegen.compile import compiled
 from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import ExplicitIntegrator, Integrator, Stage
+from ocp.nlp.blocked_rows import held_rows, on_held_controls, rows_by_stage
 from ocp.nlp.start_slope import start_slope, step_with_fixed_start
 from ocp.nlp.violated_row import most_violated
-from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows, depends_on
+from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
 from ocp.problem.control_blocks import ControlBlocks
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import time_unit
@@ -40,8 +41,7 @@ class Transcription:
             is differentiated, for starts where a slope is not finite. z_0 stays an unknown
             with equal bounds, so that the stages keep their structure.
         nodes: as fractions of the horizon, (N + 1,); None: see ``node_fractions``.
-        blocks: controls that are held over several intervals. Each interval keeps its own, and
-            inside a block it is the next state of the one before: so stages stay stages.
+        blocks: controls that are held over several intervals, see ``blocked_rows``.
     """
 
     ocp: OCP
@@ -177,22 +177,11 @@ class Transcription:
         if ocp.has_free_time:
             after = ca.vertcat(after, z[nx, :-1])
         first = ocp.functions.initial(x[:, 0], t0, p_left[:, 0] if n_p else ca.DM(0, 1))
-        stages = self._by_stage(z[:, 1:] - after, u, inside)
+        stages = rows_by_stage(z[:, 1:] - after, u, inside, self.blocks)
         last = self.last(x[:, -1], t_final, p_final)
         g = ca.vertcat(stages[0], first, *stages[1:], last)
         f = ca.sum2(costs) + ocp.functions.terminal_cost(x[:, -1], t_final, p_final)
         return {"x": w, "f": f, "g": g, "p": data}
-
-    def _by_stage(self, gaps: ca.MX, u: ca.MX, inside: ca.MX) -> list[ca.MX]:
-        """Return the rows of the first stage, and of the others: gaps, controls held, path."""
-        if self.blocks is None:
-            rows = ca.vertcat(gaps, inside)
-            return [rows[:, 0], ca.vec(rows[:, 1:])]
-        own, ahead = u[: self.blocks.controls, :], [*self.blocks.follows[1:], False]
-        return [
-            ca.vertcat(gaps[:, k], *([own[:, k + 1] - own[:, k]] if goes_on else []), inside[:, k])
-            for k, goes_on in enumerate(ahead)
-        ]
 
     @cached_property
     def rows(self) -> tuple[ConstraintRow, ...]:
@@ -203,15 +192,14 @@ class Transcription:
             for name in ocp.model.x_names
         ]
         gap += [ConstraintRow("final time", "time", 1, 0.0, 0.0)] * int(ocp.has_free_time)
-        held, repeats = self._held_rows
+        held, repeats = held_rows(ocp, self.blocks)
+        repeated = on_held_controls(ocp, self.blocks)
         path = ocp.rows.path.rows
         rows: list[ConstraintRow] = []
         for k in range(self.n):
             rows += [replace(row, node=k + 1) for row in gap]
             rows += [replace(row, node=k + 1) for row in held if k + 1 in repeats]
-            for row, is_decided, is_said in zip(
-                path, ocp.decided_by_start, self._on_held_controls, strict=True
-            ):
+            for row, is_decided, is_said in zip(path, ocp.decided_by_start, repeated, strict=True):
                 free = (k == 0 and is_decided) or (k in repeats and is_said)
                 bounds = {"lower": -np.inf, "upper": np.inf} if free else {}
                 rows.append(replace(row, node=k, **bounds))
@@ -219,22 +207,6 @@ class Transcription:
                 rows += ocp.rows.initial.rows
         rows += [replace(row, node=self.n) for row in self.last_rows.rows]
         return tuple(rows)
-
-    @property
-    def _held_rows(self) -> tuple[list[ConstraintRow], set[int]]:
-        """What holds the controls of an interval, and the intervals at whose start it does."""
-        if self.blocks is None:
-            return [], set()
-        names = self.ocp.model.u_names[: self.blocks.controls]
-        held = [ConstraintRow(f"block of {name}", "time", 1, 0.0, 0.0) for name in names]
-        return held, set(np.flatnonzero(self.blocks.follows).tolist())
-
-    @property
-    def _on_held_controls(self) -> np.ndarray:
-        """Which path rows say the same all over a block, bool (m,)."""
-        ocp, count = self.ocp, self.blocks.controls if self.blocks else 0
-        others = ca.vertcat(ocp.model.x, ocp.model.u[count:], ocp.model.t, ocp.p)
-        return ~depends_on(ocp.rows.path.expression, others)
 
     def bounds(self, data: RunData) -> dict[str, np.ndarray]:
         """Return lbx, ubx, lbg, ubg for a start."""

@@ -128,6 +128,11 @@ class Draft:
         at = {i: nx + k for k, i in enumerate(self.kept)} | self.moved
         return np.array([at[i] for i in range(self.ocp.model.nu)], dtype=int)
 
+    def add_steps(self, name: str, symbol: ca.SX, inner: np.ndarray, value: np.ndarray) -> None:
+        """Add a constant (m,) that steps at instants, see ``Steps``."""
+        taken = {entry.name for entry in (*self.ocp.parameters, *self.ocp.unknowns, *self.steps)}
+        self.steps.append(Steps(unused(name, taken), symbol, inner, value))
+
     def problem(self) -> OCP:
         """Return the rewritten problem."""
         ocp, m = self.ocp, self.ocp.model

@@ -26,7 +26,6 @@ from ocp.normal_form.draft import AddedStates, Draft
 from ocp.problem.constraint import Box
 from ocp.problem.functions import stacked
 from ocp.problem.ocp import OCP
-from ocp.problem.parameters import Steps
 from ocp.problem.portable import Portable
 
 # Instants nearer than this, in fractions of the horizon, are one.
@@ -62,7 +61,7 @@ def add_data(draft: Draft) -> DataTerms | None:
     seen = np.array([instants <= edge + _SAME for edge in (0.0, *inner)], dtype=float)
     w, y = (ca.SX.sym(f"{what} of data", h.numel()) for what in ("weight", "weighted mean"))
     levels = np.hstack([seen @ weights, seen @ (weights * values)])
-    draft.steps.append(Steps("data", ca.vertcat(w, y), inner, levels))
+    draft.add_steps("data", ca.vertcat(w, y), inner, levels)
     model = ocp.model
     along = ca.jacobian(h, model.x) @ solved(model.f) + ca.jacobian(h, model.t)
     at_end, typical = _end(h, weights, values)
@@ -115,7 +114,7 @@ def _add_steps(
     table[at] = np.hstack([weights, values])
     w, y = (ca.SX.sym(f"{what} of data", h.numel()) for what in ("weight", "value"))
     between = (np.arange(steps) + 0.5) / steps
-    draft.steps.append(Steps("data", ca.vertcat(w, y), between, table))
+    draft.add_steps("data", ca.vertcat(w, y), between, table)
     cost = ca.dot(w, (h - y) ** 2)
     draft.running_cost += cost
     draft.terminal_cost += cost

@@ -16,7 +16,7 @@ import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
 from ocp.problem.constraint import Box, Constraint
-from ocp.problem.parameters import Steps
+from ocp.problem.portable import Portable
 from ocp.problem.scaled import sizes_of
 
 # Instants nearer to an end than this, in fractions of the horizon, are it.
@@ -24,7 +24,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Waypoints:
+class Waypoints(Portable):
     """What constraints at instants have added.
 
     Attributes:
@@ -75,7 +75,7 @@ def _add(draft: Draft, c: Constraint) -> tuple[slice, ca.SX]:
         rates = [-flags[i] * change for i in range(count)]
         values = [value + q[i] for i in range(count)]
     sizes = sizes_of(ocp).rows[c.name]
-    draft.steps.append(Steps(f"instants of {c.name}", flags, edges, levels))
+    draft.add_steps(f"instants of {c.name}", flags, edges, levels)
     for name, kept in zip(names, values, strict=True):
         own = Constraint(draft.unused(name), kept, c.lower, c.upper, at="terminal", nominal=sizes)
         draft.constraints.append(own)

@@ -99,7 +99,8 @@ def test_constraint_stacks_its_rows_and_sizes_its_bounds() -> None:
             ca.SX.sym("x"),
             (0.0, 1.0),
             "somewhere",
-            "at = 'somewhere' is no place; 'path', 'initial', 'terminal', 'integral' are",
+            "at = 'somewhere' is no place; 'path', 'initial', 'terminal', 'integral', "
+            "'instants' are",
         ),
         (ca.MX.sym("x", 2, 2), (0.0, 1.0), "path", r"constraint 'c' has shape \(2, 2\)"),
         (ca.SX.sym("x", 2, 2), (0.0, 1.0), "path", r"constraint 'c' has shape \(2, 2\)"),

@@ -13,6 +13,7 @@ from ocp import (
     FreeTime,
     Measurement,
     Model,
+    Parameter,
     ProblemError,
     Soft,
     Solution,
@@ -22,7 +23,7 @@ from ocp import (
 )
 from solvers import Collocation, MultipleShooting, polish
 
-Z, U = ca.SX.sym("z", 2), ca.SX.sym("u")
+Z, U, S = ca.SX.sym("z", 2), ca.SX.sym("u"), ca.SX.sym("s")
 MASS = Model(name="mass", x=Z, u=U, f=ca.vertcat(Z[1], U))
 ARRIVE = Constraint("arrive", Z, [1, 0], [1, 0], at="terminal")
 GATE = Constraint("gate", Z[0], 0.5, 0.5, at=0.3)
@@ -117,7 +118,8 @@ def test_a_failure_names_constraint_and_instant():
 
 def test_data_and_waypoints_jump_together():
     seen = Measurement("place", Z[0], [0.5], [0.4], 0.1)
-    ocp = transfer(GATE, data=(seen,))
+    names = (Parameter("data", ca.SX.sym("a"), 1.0), Parameter("instants of gate", S, 1.0))
+    ocp = transfer(GATE, data=(seen,), parameters=names)
     exact = polish(solve(ocp, MultipleShooting(50))).or_raise()
     collocated = solve(ocp, Collocation(20)).or_raise()
     assert collocated.cost == pytest.approx(exact.cost, rel=1e-8)
