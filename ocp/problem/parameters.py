@@ -314,7 +314,7 @@ class ParameterValues:
     def as_dict(self) -> dict[str, np.ndarray]:
         """Return name -> value, as ``run(parameters=...)`` takes it."""
         each = zip(self.entries, self.values, strict=True)
-        return {e.name: v for e, v in each if not isinstance(e, Unknown | StartValue)}
+        return {e.name: v for e, v in each if not isinstance(e, Steps | Unknown | StartValue)}
 
     def named(self, name: str) -> np.ndarray | None:
         """Return the value of one entry; None where there is none of that name."""
