@@ -129,10 +129,9 @@ def test_a_control_loop_acts_as_with_ipopt() -> None:
     np.testing.assert_allclose(loops[0].x, loops[1].x, atol=1e-5)
 
 
-# What ends elsewhere, at 20 intervals: another local minimum, or no success of either.
-ELSEWHERE = ("hypersensitive", "linear-hypersensitive")
-LIBRARY = [case for case in all_cases() if case.name not in ELSEWHERE]
-LIBRARY = [case for case in LIBRARY if not case.name.startswith("arm-")]
+# What ends elsewhere at 20 intervals: in another local minimum, or without a success of either.
+ELSEWHERE = ("cart-pole-swing-up", "hypersensitive", "linear-hypersensitive")
+LIBRARY = [case for case in all_cases() if "arm-0" not in case.name and case.name not in ELSEWHERE]
 
 
 @pytest.mark.slow

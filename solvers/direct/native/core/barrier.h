@@ -20,6 +20,9 @@
 /* Regularisation of equations. */
 #define RELAX 1e-8
 
+/* The larger one; NaN stays, which fmax would hide. */
+static double larger(double a, double b) { return b > a || b != b ? b : a; }
+
 /* Residuals of slacks and equations, and the weights. */
 static void weigh(Workspace *s) {
   for (int i = 0; i < s->rows; i++) {
@@ -86,7 +89,7 @@ static void refine(Workspace *s) {
     for (int i = 0; i < s->rows; i++) {
       const double e = s->is_equation[i] * (s->r_y[i] + s->dv[i]);
       s->force[i] = e / RELAX;
-      left = fmax(left, fabs(e));
+      left = larger(left, fabs(e));
     }
     if (!(left > 1e-14) || !(left < 0.25 * before)) return;
     before = left;
@@ -154,9 +157,6 @@ static double mean_product_after(const Workspace *s, double primal, double dual)
   }
   return sum / s->sides;
 }
-
-/* The larger one; NaN stays, which fmax would hide. */
-static double larger(double a, double b) { return b > a || b != b ? b : a; }
 
 /* What the optimality conditions leave at the iterate, for a barrier parameter; needs weigh(). */
 static Residuals residuals(Workspace *s, double mu) {

@@ -13,7 +13,11 @@
 
 static double clock_seconds(void) {
   struct timespec now;
+#ifdef CLOCK_MONOTONIC
+  clock_gettime(CLOCK_MONOTONIC, &now);
+#else
   timespec_get(&now, TIME_UTC);
+#endif
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
@@ -56,10 +60,10 @@ static void fit_multipliers(Workspace *s) {
   solve_system(s, s->rhs, NULL, s->dx, s->du, s->dlambda);
   along_rows(s, s->dx, s->du, s->dv);
   double largest = 0.0;
-  for (int i = NX; i < (s->n + 1) * NX; i++) largest = fmax(largest, fabs(s->dlambda[i]));
+  for (int i = NX; i < (s->n + 1) * NX; i++) largest = larger(largest, fabs(s->dlambda[i]));
   for (int i = 0; i < s->rows; i++) {
     s->dy[i] = s->is_equation[i] * s->dv[i] / RELAX;
-    largest = fmax(largest, fabs(s->dy[i]));
+    largest = larger(largest, fabs(s->dy[i]));
   }
   if (!(largest <= HUGE_MULTIPLIER)) return;
   for (int i = NX; i < (s->n + 1) * NX; i++) s->lambda[i] = s->dlambda[i];
