@@ -89,10 +89,11 @@ def residual_slopes(solution: Solution, estimated: Estimated) -> tuple[np.ndarra
             k = int(np.abs(truth.t - truth.t[0] - time).argmin())
             p = values.at(min(1.0, time / ocp.duration))[0]
             h, h_x, h_theta = (np.array(v) for v in read(truth.x[k], truth.t[k], p))
-            known, sigma = np.isfinite(m.values[i]), np.asarray(m.sigma)[i]
+            y, sigma = np.asarray(m.values)[i], np.asarray(m.sigma)[i]
+            known = np.isfinite(y)
             slope = (h_x @ slopes[k] + h_theta)[columns]
             rows.append((slope / sigma[:, None])[known])
-            residuals.append(((h.ravel()[columns] - m.values[i]) / sigma)[known])
+            residuals.append(((h.ravel()[columns] - y) / sigma)[known])
         first += m.size
     return np.concatenate(residuals), np.vstack(rows)
 

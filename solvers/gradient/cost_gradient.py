@@ -83,9 +83,9 @@ class AdjointSweeps:
         if fast:
             step, back = compiled(step), compiled(back)
         ends = ocp.functions.terminal_cost, ocp.functions.terminal_gradient
-        return cls(
-            ocp, nodes, exact, *map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n), *ends))
-        )
+        sweeps = map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n)))
+        final_cost, final_gradient = map(BufferedFunction, ends)
+        return cls(ocp, nodes, exact, *sweeps, final_cost, final_gradient)
 
 
 class Objective:

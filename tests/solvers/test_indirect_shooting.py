@@ -287,6 +287,7 @@ def test_any_number_of_segments(segments: int, more: int) -> None:
     solver = IndirectShooting(segments=segments, steps=14 + segments + more, judged=False)
     solution = solve(tracker(), solver)
     assert solution.status is Status.STATIONARY
+    assert isinstance(solver.steps, int)
     assert len(solution.t) - 1 >= solver.steps
     assert (len(solution.t) - 1) % segments == 0
     assert solution.cost == pytest.approx(0.5551274, rel=2e-2)

@@ -131,9 +131,9 @@ def test_data_change_without_rebuilding(backend: Backend) -> None:
     again = program.run(parameters=OTHER, x0=x0, t0=t0)
     declared = tracker()
     entries = tuple(
-        Parameter(e.name, e.symbol, OTHER[e.name])
-        if isinstance(e, Parameter)
-        else Signal(e.name, e.symbol, OTHER[e.name], hold=e.hold)
+        Signal(e.name, e.symbol, OTHER[e.name], hold=e.hold)
+        if isinstance(e, Signal)
+        else Parameter(e.name, e.symbol, OTHER[e.name])
         for e in declared.parameters
     )
     fresh = MultipleShooting(30, backend=backend).build(
