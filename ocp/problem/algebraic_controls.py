@@ -11,7 +11,6 @@ import numpy as np
 
 from ocp.problem.algebraic import AlgebraicSolution
 from ocp.problem.constraint import Box, Constraint, unused
-from ocp.problem.first_evaluation import inside
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
 
@@ -78,7 +77,7 @@ class AlgebraicControls:
     @property
     def first_controls(self) -> np.ndarray:
         """Controls of the original to begin with where a guess has none, (nu,)."""
-        return inside(self.written.control_bounds)
+        return self.written.control_bounds.inside()
 
     def _first_guess(self) -> Guess:
         """Return the guess of the problem, or what its start makes of one, with the variables."""

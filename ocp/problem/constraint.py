@@ -71,6 +71,15 @@ class Box(Portable):
         """Whether any component is bounded at all."""
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
+    def inside(self) -> np.ndarray:
+        """Return a point within, not on a bound: the middle, 1 off a single bound, or 0 (n,)."""
+        lower, upper = np.asarray(self.lower, dtype=float), np.asarray(self.upper, dtype=float)
+        is_below, is_above = np.isfinite(lower), np.isfinite(upper)
+        below, above = np.where(is_below, lower, 0.0), np.where(is_above, upper, 0.0)
+        one_sided = np.where(is_below, np.maximum(below + 1.0, 0.0), np.minimum(above - 1.0, 0.0))
+        one_sided = np.where(is_below | is_above, one_sided, 0.0)
+        return np.where(is_below & is_above, (below + above) / 2.0, one_sided)
+
     def clip(self, value: np.ndarray) -> np.ndarray:
         """Return the nearest point of the box, along the last axis."""
         # np.clip and np.nan_to_num cost several times what they do to a short row.

@@ -1,47 +1,25 @@
 """Checks of a problem's measurements against its states and its horizon."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
 
 from ocp.checks.errors import ProblemError
 from ocp.checks.expressions import refuse_foreign_symbols
-from ocp.problem.constraint import Constraint
-from ocp.problem.measurement import Measurement
-from ocp.problem.model import Model
-from ocp.problem.parameters import Entry, Parameter, Unknown
+from ocp.problem.parameters import Parameter, Unknown
+from ocp.problem.statement import Statement
 
 # An instant is the end of the horizon, or a step, if it is nearer than this, relative to either.
 _ROUNDING = 1e-9
 
 
-class _Problem(Protocol):
-    """What of an ``OCP`` is looked at: its own file is built on this one."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def model(self) -> Model: ...
-
-    @property
-    def data(self) -> tuple[Measurement, ...]: ...
-
-    @property
-    def duration(self) -> float: ...
-
-    @property
-    def has_free_time(self) -> bool: ...
-
-
-def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
+def check_data(ocp: Statement) -> None:
     """Refuse measurements of what has no value at an instant, or outside the horizon."""
     if not ocp.data:
         return
     _check_names(ocp.name, [m.name for m in ocp.data])
-    constants = [e.symbol for e in entries if isinstance(e, Parameter | Unknown)]
+    constants = [e.symbol for e in ocp.entries if isinstance(e, Parameter | Unknown)]
     for m in ocp.data:
         what = f"{ocp.name}: measurement '{m.name}'"
         refuse_foreign_symbols(
@@ -52,16 +30,16 @@ def check_data(ocp: _Problem, entries: Sequence[Entry]) -> None:
         _check_times(ocp, np.asarray(m.times), what)
 
 
-def check_instants(ocp: _Problem, constraints: Sequence[Constraint]) -> None:
+def check_instants(ocp: Statement) -> None:
     """Refuse constraints at instants outside the horizon, or at its start."""
-    for c in constraints:
+    for c in ocp.at("instants"):
         what = f"{ocp.name}: constraint '{c.name}'"
         _check_times(ocp, c.instants, what)
         if c.instants[0] <= _ROUNDING * ocp.duration:
             raise ProblemError(f"{what}: t = 0 s is the start: write at='initial'")
 
 
-def _check_times(ocp: _Problem, times: np.ndarray, what: str) -> None:
+def _check_times(ocp: Statement, times: np.ndarray, what: str) -> None:
     """Refuse instants (K,) outside the horizon, or between the steps of discrete time."""
     if ocp.has_free_time:
         raise ProblemError(

@@ -1,98 +1,23 @@
 """A problem in mathematics, as text for a person."""
 
 from collections.abc import Iterable
-from typing import Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ocp.checks.expressions import element_names, readable
 from ocp.problem.constraint import Box, Constraint, Soft
-from ocp.problem.delay import Delay
 from ocp.problem.measurement import Measurement
-from ocp.problem.model import Model
-from ocp.problem.parameters import Parameter, Signal, Steps, Unknown
-from ocp.problem.peak import Peak
-from ocp.problem.rate import ControlRates
+from ocp.problem.parameters import Unknown
+from ocp.problem.statement import Statement
 
 
-class _Problem(Protocol):
-    """What of an ``OCP`` is written down: its own file is built on this one."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def model(self) -> Model: ...
-
-    @property
-    def x0(self) -> ArrayLike: ...
-
-    @property
-    def duration(self) -> float: ...
-
-    @property
-    def steps(self) -> int | None: ...
-
-    @property
-    def time_box(self) -> Box: ...
-
-    @property
-    def has_free_time(self) -> bool: ...
-
-    @property
-    def start_is_free(self) -> np.ndarray: ...
-
-    @property
-    def start_bounds(self) -> Box: ...
-
-    @property
-    def running_cost(self) -> ca.SX | float: ...
-
-    @property
-    def terminal_cost(self) -> ca.SX | float: ...
-
-    @property
-    def state_bounds(self) -> Box: ...
-
-    @property
-    def control_bounds(self) -> Box: ...
-
-    @property
-    def constraints(self) -> tuple[Constraint, ...]: ...
-
-    @property
-    def invariants(self) -> tuple[Constraint, ...]: ...
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]: ...
-
-    @property
-    def peaks(self) -> tuple[Peak, ...]: ...
-
-    @property
-    def control_rates(self) -> ControlRates: ...
-
-    @property
-    def delays(self) -> tuple[Delay, ...]: ...
-
-    @property
-    def last_input(self) -> ArrayLike | None: ...
-
-    @property
-    def parameters(self) -> tuple[Parameter | Signal | Steps, ...]: ...
-
-    @property
-    def data(self) -> tuple[Measurement, ...]: ...
-
-
-def describe(ocp: _Problem) -> str:
+def describe(ocp: Statement) -> str:
     """Return the problem as it would stand in a paper."""
     return "\n".join(["", *_lines(ocp)]).lstrip("\n")
 
 
-def _lines(ocp: _Problem) -> Iterable[str]:
+def _lines(ocp: Statement) -> Iterable[str]:
     m = ocp.model
     discrete = m.is_discrete
     tf = "T" if ocp.has_free_time else f"{ocp.duration:g}"
@@ -138,7 +63,7 @@ def _lines(ocp: _Problem) -> Iterable[str]:
         yield f"    {entry.name} ({symbols}): {kind}, {_vector(entry.value)}"
 
 
-def _rates(ocp: _Problem) -> Iterable[str]:
+def _rates(ocp: Statement) -> Iterable[str]:
     """Say how fast controls may change, at what price, and from where on."""
     m, rates = ocp.model, ocp.control_rates
     bounds = np.asarray(rates.box.lower), np.asarray(rates.box.upper)
