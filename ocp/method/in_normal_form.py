@@ -141,33 +141,46 @@ class _Added:
 
     def _states(self, fractions: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the added states: constants, and integrals along the guess."""
-        form, nx, m = self.form, x.shape[1], self.form.original.model
+        form, nx = self.form, x.shape[1]
         whole = np.tile(form.problem.start(), (len(x), 1))
         whole[:, form.start] = form.copied(x[0])
         for name, at in form.unknowns.items():
             if name in self.known:
                 whole[:, at] = self.known[name]
         u = self.given.sample("u", fractions, form.original.model.nu)
-        if u is not None and len(rates := form.original.control_rates):
+        if u is not None:
+            self._fill_sent(whole, u)
+            self._fill_values(whole, fractions, x, u)
+        return whole[:, nx:]
+
+    def _fill_sent(self, whole: np.ndarray, u: np.ndarray) -> None:
+        """Write what was sent (k, nu) into the states (k, n) that keep it."""
+        form, original = self.form, self.form.original
+        if len(rates := original.control_rates):
             # Of a control that is a state itself; in discrete time of the one before.
             before = u if len(form.rates) else np.vstack([u[:1], u[:-1]])
             whole[:, form.last_input] = before[:, rates.index]
-        for delay in form.original.delays if u is not None else ():
-            past = np.append(whole[0, form.histories[delay.name]], u[:, delay.index(m)])
-            rows = np.lib.stride_tricks.sliding_window_view(past, delay.steps)
-            whole[:, form.histories[delay.name]] = rows[: len(x)]
-        if form.peaks and u is not None:
-            along = self._along(form.original.functions.peaks, fractions, x, u)
-            tops = largest(form.original.peaks, along)
-            for at, top in zip(form.peaks.values(), tops, strict=True):
+        for delay in original.delays:
+            at = form.histories[delay.name]
+            sent = np.append(whole[0, at], u[:, delay.index(original.model)])
+            rows = np.lib.stride_tricks.sliding_window_view(sent, delay.steps)
+            whole[:, at] = rows[: len(whole)]
+
+    def _fill_values(
+        self, whole: np.ndarray, fractions: np.ndarray, x: np.ndarray, u: np.ndarray
+    ) -> None:
+        """Write peaks and integrals along the guess into their states (k, n)."""
+        form, original = self.form, self.form.original
+        if form.peaks:
+            along = self._along(original.functions.peaks, fractions, x, u)
+            for at, top in zip(form.peaks.values(), largest(original.peaks, along), strict=True):
                 whole[:, at] = top
-        if form.integrals and u is not None:
-            along = self._along(form.original.functions.integrands, fractions, x, u)
-            rates = np.split(along, np.cumsum([c.size for c in form.original.at("integral")]), 1)
+        if form.integrals:
+            along = self._along(original.functions.integrands, fractions, x, u)
+            rates = np.split(along, np.cumsum([c.size for c in original.at("integral")]), 1)
             times = fractions * self._duration
             for at, rate in zip(form.integrals.values(), rates, strict=False):
                 whole[:, at] = cumulative_trapezoid(rate, times, axis=0, initial=0.0)
-        return whole[:, nx:]
 
     def _slacks(self, fractions: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the slacks that go with guessed controls."""
