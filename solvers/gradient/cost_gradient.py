@@ -83,9 +83,9 @@ class AdjointSweeps:
         if fast:
             step, back = compiled(step), compiled(back)
         ends = ocp.functions.terminal_cost, ocp.functions.terminal_gradient
-        sweeps = map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n)))
+        forwards, backwards = map(BufferedFunction, (step.mapaccum(n), back.mapaccum(n)))
         final_cost, final_gradient = map(BufferedFunction, ends)
-        return cls(ocp, nodes, exact, *sweeps, final_cost, final_gradient)
+        return cls(ocp, nodes, exact, forwards, backwards, final_cost, final_gradient)
 
 
 class Objective:
