@@ -1,4 +1,4 @@
-"""Checks of a problem's measurements against its states and its horizon."""
+"""Checks of what holds at instants, measurements and constraints, against states and horizon."""
 
 from collections.abc import Sequence
 
