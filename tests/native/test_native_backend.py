@@ -131,7 +131,11 @@ def test_a_control_loop_acts_as_with_ipopt() -> None:
 
 # What ends elsewhere at 20 intervals: in another local minimum, or without a success of either.
 ELSEWHERE = ("cart-pole-swing-up", "hypersensitive", "linear-hypersensitive")
-LIBRARY = [case for case in all_cases() if "arm-0" not in case.name and case.name not in ELSEWHERE]
+LIBRARY = [
+    case
+    for case in all_cases()
+    if not case.name.startswith(("arm-", "compare-")) and case.name not in ELSEWHERE
+]
 
 
 @pytest.mark.slow

@@ -225,7 +225,7 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     const int warm = o->warm != 0.0;
     s->mu = o->barrier;
     s->shift = s->last_shift = s->largest_theta = 0.0;
-    s->iteration = s->is_monotone = s->short_steps = s->filter_size = 0;
+    s->iteration = s->is_monotone = s->filter_size = 0;
     s->factorisations = s->evaluations = s->values = 0;
     s->length = 1.0;
     if (o->monotone != 0.0) s->is_monotone = 1;

@@ -36,7 +36,7 @@ typedef struct {
   double barrier;       /* first barrier parameter */
   double max_iterations;
   double time_limit;    /* [s] */
-  double pause;         /* after so long solve() returns PAUSED, to be called again [s] */
+  double pause;         /* after so long native_solve() returns PAUSED, to be called again [s] */
   double warm;          /* whether the costates are a guess of value */
   double monotone;      /* whether the barrier parameter only falls, from the beginning */
 } Options;
@@ -111,7 +111,7 @@ typedef struct {
   /* Course of the iteration. */
   Residuals left;
   double mu, shift, last_shift, length, largest_theta;
-  int iteration, is_monotone, short_steps, factorisations, evaluations, values;
+  int iteration, is_monotone, factorisations, evaluations, values;
   int filter_size;
   double filter_theta[FILTER], filter_phi[FILTER];
   double seconds; /* used so far */
