@@ -102,7 +102,7 @@ def multistart(
     guesses = [None, *_guesses(ocp, starts - 1, seed, amplitude)]
     found: list[LocalOptimum[Any]] = []
     for guess in guesses:
-        solution = program.run(guess=guess).with_(build_time=build_time)
+        solution: Any = program.run(guess=guess).with_(build_time=build_time)
         if not solution.status.is_success:
             continue
         verdict = evaluate(solution)
