@@ -88,7 +88,8 @@ def multistart(
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
     """
-    check_instance(ocp, (OCP, Phases), "multistart: ocp")
+    if not isinstance(ocp, Phases):
+        check_instance(ocp, OCP, "multistart: ocp")
     check_instance(solver, Solver, "multistart: solver")
     check_whole(starts, "multistart: starts")
     check_whole(seed, "multistart: seed", least=0)
