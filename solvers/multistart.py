@@ -88,7 +88,8 @@ def multistart(
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
     """
-    check_instance(ocp, (OCP, Phases), "multistart: ocp")
+    if not isinstance(ocp, Phases):
+        check_instance(ocp, OCP, "multistart: ocp")
     check_instance(solver, Solver, "multistart: solver")
     check_whole(starts, "multistart: starts")
     check_whole(seed, "multistart: seed", least=0)
@@ -102,7 +103,7 @@ def multistart(
     guesses = [None, *_guesses(ocp, starts - 1, seed, amplitude)]
     found: list[LocalOptimum[Any]] = []
     for guess in guesses:
-        solution = program.run(guess=guess).with_(build_time=build_time)
+        solution: Any = program.run(guess=guess).with_(build_time=build_time)
         if not solution.status.is_success:
             continue
         verdict = evaluate(solution)

@@ -71,7 +71,8 @@ def polish(
             bounds that act, a Hamiltonian linear in the control, a cost with kinks).
     """
     check_positive(accuracy, "polish: accuracy")
-    check_instance(solution, (Solution, PhasesSolution), "polish: solution")
+    if not isinstance(solution, PhasesSolution):
+        check_instance(solution, Solution, "polish: solution")
     solver = solver or IndirectShooting(segments=SEGMENTS, steps=STEPS)
     check_instance(solver, IndirectShooting, "polish: solver")
     if isinstance(solution, PhasesSolution):

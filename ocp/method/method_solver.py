@@ -56,9 +56,9 @@ class MethodSolver(Solver):
         Raises:
             UnsupportedProblem: naming the term that this method cannot treat.
         """
-        check_instance(ocp, (OCP, CompositeProblem), f"{type(self).__name__}: the problem")
         if isinstance(ocp, CompositeProblem):
             return ocp.built_by(self)
+        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
         self.refuse_written(ocp)
         refuse_without_derivatives(ocp, self.derivatives, type(self).__name__)
         form = normal_form(ocp)

@@ -99,10 +99,10 @@ def evaluate(
     Raises:
         ProblemError: if it is no solution, or the tolerance not positive.
     """
-    check_instance(solution, (Solution, CompositeSolution), "evaluate: solution")
     check_positive(tolerance, "evaluate: tolerance")
     if isinstance(solution, CompositeSolution):
         return solution.evaluated(tolerance)
+    check_instance(solution, Solution, "evaluate: solution")
     return _evaluation(solution, tolerance)
 
 

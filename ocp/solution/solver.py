@@ -175,7 +175,8 @@ def solve(ocp: OCP | CompositeProblem[S], solver: Solver, *, guess: Any = None) 
         UnsupportedProblem: where the method cannot treat the problem, naming the term.
         ProblemError: if an argument is of another kind, or the guess does not fit.
     """
-    check_instance(ocp, (OCP, CompositeProblem), "solve: ocp")
+    if not isinstance(ocp, CompositeProblem):
+        check_instance(ocp, OCP, "solve: ocp")
     check_instance(solver, Solver, "solve: solver")
     ocp.first_guess(guess)
     start = perf_counter()

@@ -143,7 +143,8 @@ def certify(
             or no method answers.
     """
     effort = effort or CertifyOptions()
-    check_instance(solution, (Solution, PhasesSolution), "certify: solution")
+    if not isinstance(solution, PhasesSolution):
+        check_instance(solution, Solution, "certify: solution")
     check_instance(effort, CertifyOptions, "certify: effort")
     if isinstance(solution, PhasesSolution):
         found = certify(solution.whole, effort)
