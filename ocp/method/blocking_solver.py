@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import Self
 
-from ocp.checks.arguments import check_instance
+from ocp.checks.arguments import check_whole
 from ocp.method.scaling_solver import ScalingSolver
 from ocp.problem.control_blocks import ControlBlocks, check_blocks
 from ocp.problem.ocp import OCP
@@ -28,11 +28,12 @@ class BlockingSolver(ScalingSolver):
         """Check the option."""
         super().__post_init__()
         object.__setattr__(self, "blocks", check_blocks(self.blocks, type(self).__name__))
+        if self.blocked is not None:
+            check_whole(self.blocked, f"{type(self).__name__}: blocked", least=0)
 
-    def build(self, ocp: OCP) -> Program:
-        """Do all symbolic work; see ``MethodSolver.build``."""
-        check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
-        return super(BlockingSolver, self.blocking(ocp)).build(ocp)
+    def build_one(self, ocp: OCP) -> Program:
+        """Do all symbolic work; see ``MethodSolver.build_one``."""
+        return super(BlockingSolver, self.blocking(ocp)).build_one(ocp)
 
     def blocking(self, ocp: OCP) -> Self:
         """Return the solver that holds the controls of a problem in blocks, and no others."""

@@ -59,6 +59,10 @@ class MethodSolver(Solver):
         if isinstance(ocp, CompositeProblem):
             return ocp.built_by(self)
         check_instance(ocp, OCP, f"{type(self).__name__}: the problem")
+        return self.build_one(ocp)
+
+    def build_one(self, ocp: OCP) -> Program:
+        """Build a single problem; see ``build``."""
         self.refuse_written(ocp)
         refuse_without_derivatives(ocp, self.derivatives, type(self).__name__)
         form = normal_form(ocp)
