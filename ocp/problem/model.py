@@ -143,7 +143,9 @@ class Model(Portable):
     @property
     def z_start(self) -> ca.SX:
         """Where a root of g is looked for (nz,); 0 where it does not matter."""
-        return ca.SX.zeros(self.nz) if self.z_guess is None else ca.SX(self.z_guess)
+        if self.z_guess is None:
+            return ca.SX.zeros(self.nz)
+        return check_column(self.z_guess, f"model '{self.name}': z_guess")
 
     @property
     def is_discrete(self) -> bool:

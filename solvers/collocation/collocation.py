@@ -81,7 +81,6 @@ class Collocation(ScalingSolver):
 
     takes_phases: ClassVar[bool] = True
 
-    intervals: int = 25
     intervals: int | Grid = 25
     degree: int = 4
     points: Family = "radau"

@@ -71,7 +71,6 @@ class MultipleShooting(BlockingSolver):
 
     takes_phases: ClassVar[bool] = True
 
-    intervals: int = 75
     intervals: int | Grid = 75
     integrator: Integrator = field(default_factory=RK4)
     backend: Literal["ipopt", "fatrop", "native"] = "ipopt"

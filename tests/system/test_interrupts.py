@@ -23,6 +23,7 @@ from solvers import (
     StagewiseNewton,
     multistart,
 )
+from solvers.direct.nlp_backends import CasadiNlp
 from solvers.direct.subprocess_function import SUBPROCESS_SUPPORTED
 from tests.mpc.problems import cart
 from tests.system.problems import braking
@@ -177,6 +178,7 @@ def test_ctrl_c_comes_out(what: str) -> None:
 def test_ctrl_c_ends_the_process_of_fatrop() -> None:
     solver = MultipleShooting(100, backend="fatrop", time_limit=100.0)
     program = solver.prepare(hard())
+    assert isinstance(program.nlp, CasadiNlp)
     function = program.nlp.subprocess
     assert function is not None
     process = function.process
