@@ -29,7 +29,8 @@ class Plant:
     from the controller's problem in anything (parameters, dynamics, obstacles).
 
     Args:
-        ocp: truth, cost and constraints; its horizon does not count, nor do its peaks.
+        ocp: truth, cost and constraints; its horizon does not count, nor what
+            is said of a whole trajectory: peaks, data, integrals, constraints at instants.
         substeps: steps of RK4 in each sampling interval.
         process_noise: standard deviation of what is added to the state, per root of a second.
         measurement_noise: standard deviation of what is added to each measurement (nx,).

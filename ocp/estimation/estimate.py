@@ -126,6 +126,8 @@ def _check(solution: Solution) -> None:
 
 def _inverse(slopes: np.ndarray, names: tuple[str, ...], name: str) -> np.ndarray:
     """Return (A'A)^-1 of derivatives A (M, n) in these constants."""
+    if not names:  # all of them are held by their bounds
+        return np.empty((0, 0))
     sizes = np.linalg.norm(slopes, axis=0)
     if not sizes.all():
         raise ProblemError(f"{name}: estimate: no data depend on {names[int(sizes.argmin())]}")

@@ -51,6 +51,7 @@ def discretise(ocp: OCP, dt: float) -> OCP:
             "replace(discrete, rates=(Rate(u, lower * dt, upper * dt, weight / dt),))"
         )
     check_positive(dt, f"{ocp.name}: dt [s]")
+    ocp = ocp.explicit
     steps = _whole(ocp.duration / dt, f"{ocp.name}: the horizon of {ocp.duration:g} s", dt)
     terms = read_terms(ocp)
     _refuse_time(ocp, terms)

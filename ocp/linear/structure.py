@@ -65,6 +65,15 @@ def linear_quadratic(ocp: OCP) -> LinearQuadratic:
             f"{ocp.name}: the {name} is no part of A, B, Q, R: LinearMPC and Riccati take it by "
             "themselves; to read matrices, write the last input as a state"
         )
+    for what, parts in (
+        ("the measurements", ocp.data),
+        ("the unknown constants", ocp.unknowns),
+        ("the constraints at instants", ocp.at("instants")),
+        ("the integral constraints", ocp.at("integral")),
+    ):
+        if parts:
+            raise UnsupportedProblem(f"{ocp.name}: {what} are no part of A, B, Q, R")
+    ocp = ocp.explicit
     lq = _assemble(ocp, read_terms(ocp))
     complaint = lq.sample_matrices(lq.declared).indefinite()
     if complaint:

@@ -114,8 +114,11 @@ class _Added:
 
     @property
     def known(self) -> Mapping[str, ArrayLike]:
-        """The unknown constants of which the guess has values."""
-        return self.given.unknowns if isinstance(self.given, Guess | Solution) else {}
+        """The unknown constants of the problem of which the guess has values."""
+        if not isinstance(self.given, Guess | Solution):
+            return {}
+        own = {entry.name for entry in self.form.original.unknowns}
+        return {name: value for name, value in self.given.unknowns.items() if name in own}
 
     def sampled(self, part: str, fractions: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Return a part with what is added, (k, n)."""

@@ -119,9 +119,13 @@ class NormalForm(Portable):
         """Return what data cost at the end and by the integral, for the last state (n,)."""
         if self.data is None:
             return 0.0
+        return float(self._at_end(x, t, values.at(1.0)[0])) - float(x[self.data.integral])
+
+    @cached_property
+    def _at_end(self) -> ca.Function:
+        assert self.data is not None
         m = self.problem.model
-        at_end = ca.Function("data", [m.x, m.t, self.problem.p], [self.data.at_end])
-        return float(at_end(x, t, values.at(1.0)[0])) - float(x[self.data.integral])
+        return ca.Function("data", [m.x, m.t, self.problem.p], [self.data.at_end])
 
     @cached_property
     def _jump(self) -> ca.Function:

@@ -5,6 +5,7 @@ from typing import Any
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import UnsupportedProblem
+from ocp.method.blocking_solver import BlockingSolver
 from ocp.method.method_solver import MethodSolver
 from ocp.phases.chain import Chain
 from ocp.phases.describe_phases import describe_phases
@@ -67,6 +68,18 @@ class Phases(Chain, CompositeProblem[PhasesSolution]):
                 "coupled; MultipleShooting, Collocation and IndirectShooting do"
             )
         side = side_by_side(self)
+        self._refuse_blocked_slacks(solver)
         program = solver.unjudged().build(side.problem)
         accuracy = solver.success_accuracy if solver.judged else float("inf")
         return PhasesProgram(side, program, accuracy, solver.end_slack)
+
+    def _refuse_blocked_slacks(self, solver: Solver) -> None:
+        """Refuse blocks where a phase has slacks, which stand between the controls of all."""
+        if not (isinstance(solver, BlockingSolver) and solver.blocks):
+            return
+        for phase in self.phases:
+            if any(c.soft is not None and c.at == "path" for c in phase.constraints):
+                raise UnsupportedProblem(
+                    f"{self.name}: blocks would hold the slacks of phase '{phase.name}' too: write "
+                    "its soft constraint with a quadratic price alone, or take no blocks"
+                )

@@ -74,7 +74,7 @@ class PhasesProgram(CompositeProgram[PhasesSolution]):
     ) -> list[RunData]:
         """Return the numbers of each phase, checked; later ones start when the guess says so."""
         chain, given = self.side.chain, dict(parameters or {})
-        known = {entry.name for phase in chain.phases for entry in phase.parameters}
+        known = {entry.name for phase in chain.phases for entry in phase.given}
         shared = {unknown.name for unknown in chain.unknowns}
         for name in given:
             if name in shared:
@@ -88,7 +88,7 @@ class PhasesProgram(CompositeProgram[PhasesSolution]):
                 )
         found, start = [], t0
         for phase in chain.phases:
-            own = {e.name: given[e.name] for e in phase.parameters if e.name in given}
+            own = {e.name: given[e.name] for e in phase.given if e.name in given}
             found.append(RunData.of(phase, None if found else x0, start, own))
             start += phase.duration
         return found

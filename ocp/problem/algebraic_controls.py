@@ -14,9 +14,6 @@ from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
 
-# Instants at which a guess is sampled.
-_INSTANTS = 21
-
 
 @dataclass(frozen=True, eq=False)
 class AlgebraicControls:
@@ -80,13 +77,9 @@ class AlgebraicControls:
         return self.written.control_bounds.inside()
 
     def _first_guess(self) -> Guess:
-        """Return the guess of the problem, or what its start makes of one, with the variables."""
-        ocp, at = self.written, np.linspace(0.0, 1.0, _INSTANTS)
-        given = Guess() if ocp.guess is None else ocp.guess
-        x, u = given.sample("x", at, ocp.model.nx), given.sample("u", at, ocp.model.nu)
-        u = np.tile(self.first_controls, (len(at), 1)) if u is None else u
-        duration = given.duration if ocp.has_free_time else None
-        return Guess(x=x, u=np.hstack([u, self.slacks(at, x, u)]), duration=duration)
+        """Return controls to begin with, and the variables that fit to them at the start."""
+        u = self.first_controls
+        return Guess(u=np.append(u, self.slacks(np.zeros(1), None, u[None, :])[0]))
 
     def slacks(self, fractions: np.ndarray, x: np.ndarray | None, u: np.ndarray) -> np.ndarray:
         """Return the variables that fit, (k, m); where there is no root, where it is looked for.

@@ -1,6 +1,6 @@
 """Checks of what holds at instants, measurements and constraints, against states and horizon."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 import numpy as np
@@ -30,11 +30,22 @@ def check_data(ocp: Statement) -> None:
         _check_times(ocp, np.asarray(m.times), what)
 
 
-def check_instants(ocp: Statement) -> None:
-    """Refuse constraints at instants outside the horizon, or at its start."""
+def check_instants(ocp: Statement, solved: Callable[[ca.SX], ca.SX]) -> None:
+    """Refuse constraints at instants outside the horizon, at its start, or of what is sampled.
+
+    Args:
+        ocp: the problem.
+        solved: puts what algebraic variables are in their place.
+    """
     for c in ocp.at("instants"):
         what = f"{ocp.name}: constraint '{c.name}'"
         _check_times(ocp, c.instants, what)
+        for entry in ocp.moving:
+            if ca.depends_on(solved(c.expression), entry.symbol):
+                raise ProblemError(
+                    f"{what}: it holds at instants and contains the signal '{entry.name}', whose "
+                    "slope nothing knows: write its value there as a Parameter"
+                )
         if c.instants[0] <= _ROUNDING * ocp.duration:
             raise ProblemError(f"{what}: t = 0 s is the start: write at='initial'")
 

@@ -81,8 +81,9 @@ def differing(kept: Mapping[str, np.ndarray], here: Mapping[str, np.ndarray]) ->
     """Return the parts in which two problems differ; NaN and infinity agree with themselves."""
     return tuple(
         name
-        for name in here
+        for name in {**here, **kept}
         if name not in kept
+        or name not in here
         or kept[name].shape != here[name].shape
         or not _same(kept[name], here[name])
     )

@@ -26,7 +26,7 @@ def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     interval sees no jump inside it.
     Twice as many are then the same ones halved, unless as many equal ones hit the knots.
     Where there are more knots than intervals, those at which the declared samples bend are
-    taken in, then those at which they jump, then none. In discrete time the steps are the nodes.
+    taken in, then those at which they jump, then none but instants. In discrete time the steps are the nodes.
 
     Args:
         ocp: the problem.
@@ -34,7 +34,7 @@ def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
 
     Raises:
         UnsupportedProblem: for a ``Grid`` in discrete time.
-        ProblemError: where instants of data are no nodes.
+        ProblemError: where instants of data or constraints are no nodes.
     """
     if isinstance(intervals, Grid):
         if ocp.model.is_discrete:
@@ -49,8 +49,8 @@ def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     count = len(_steps(ocp))
     if count >= intervals:
         raise ProblemError(
-            f"{ocp.name}: the {count} instants of its data need more than {count} intervals, not "
-            f"{intervals}"
+            f"{ocp.name}: the {count} instants of its data or constraints need more than {count} "
+            f"intervals, not {intervals}"
         )
     for knots in _candidates(ocp):
         if (np.abs(knots[:, None] - uniform).min(axis=1, initial=1.0) <= _SAME).all():
@@ -69,29 +69,31 @@ def node_widths(nodes: np.ndarray) -> np.ndarray:
 
 
 def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
-    """Yield inner knots: all, where the samples bend, where they jump; fewer and fewer."""
+    """Yield inner knots: all, where the samples bend, where they jump, instants alone."""
     signals = [entry for entry in ocp.parameters if isinstance(entry, Signal)]
     steps = _steps(ocp)
     for which in (_all, _bending, _jumping):
         each = [which(signal) for signal in signals]
         found = np.sort(np.concatenate([steps, *each]))
         yield found[np.diff(found, prepend=0.0) > _SAME]
+    yield steps
 
 
 def _steps(ocp: OCP) -> np.ndarray:
-    """Return the instants inside the horizon at which data are, (K,)."""
+    """Return the instants inside the horizon at which something is, each once, (K,)."""
     each = [entry.inner for entry in ocp.parameters if isinstance(entry, Steps)]
-    return np.concatenate([np.zeros(0), *each])
+    found = np.sort(np.concatenate([np.zeros(0), *each]))
+    return found[np.diff(found, prepend=0.0) > _SAME]
 
 
 def _with_steps(ocp: OCP, nodes: np.ndarray) -> np.ndarray:
-    """Return nodes that a user gave, if the instants of data are among them."""
+    """Return nodes that a user gave, if the instants of data and constraints are among them."""
     apart = np.abs(_steps(ocp)[:, None] - nodes).min(axis=1) > _SAME
     if apart.any():
         missing = float(_steps(ocp)[apart.argmax()])
         raise ProblemError(
-            f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where data are: "
-            "add it by Grid.with_nodes"
+            f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where data or "
+            "a constraint are: add it by Grid.with_nodes"
         )
     return nodes
 

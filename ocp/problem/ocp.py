@@ -93,6 +93,7 @@ class OCP(Statement):
         model = self.model
         check_rates(self.name, self.control_rates, model)
         check_delays(self.name, model, self.delays)
+        self._check_delayed()
         last = check_last_input(
             self.name, self.last_input, self.control_rates, model, self.control_bounds
         )
@@ -212,12 +213,13 @@ class OCP(Statement):
         costs = ca.SX(self.running_cost), ca.SX(self.terminal_cost)
         check_symbols(name, model, self.p, costs, self.constraints, self.invariants)
         check_data(self)
-        check_instants(self)
+        check_instants(self, self.algebraic_solution)
         check_peaks(name, model, self.p, self.peaks)
         terms = [c.expression for c in (*self.constraints, *self.peaks, *self.data)]
         terms += [model.f, model.algebraic, *costs]
         check_used(name, self.unknowns, terms)
-        check_unknown_names(name, self.unknowns, model.x_names)
+        rated = [model.u_names[i] for i in self.control_rates.index]
+        check_unknown_names(name, self.unknowns, (*model.x_names, *rated))
         if model.nz:
             at_ends = [c for c in self.constraints if c.at not in ("path", "integral")]
             named = [(f"{c.at} constraint '{c.name}'", c.expression) for c in at_ends]
@@ -225,6 +227,26 @@ class OCP(Statement):
             named += [(f"measurement '{c.name}'", c.expression) for c in self.data]
             named.append(("terminal_cost", costs[1]))
             check_ends(name, model, self.algebraic_solution.values, named)
+
+    def _check_delayed(self) -> None:
+        """Refuse a delayed control in algebraic equations, and one with a rate that begins anew."""
+        for delay in self.delays:
+            name = str(delay.control)
+            if ca.depends_on(self.algebraic_solution.values, delay.control):
+                raise ProblemError(
+                    f"{self.name}: the Delay of '{name}': an algebraic variable depends on it and "
+                    "would know it at once; write the control that acts as a state of the model"
+                )
+            i = delay.index(self.model)
+            if i not in self.control_rates.index:
+                continue
+            newest, last = np.asarray(delay.history).ravel()[-1], self.last_input
+            at = int(np.flatnonzero(self.control_rates.index == i)[0])
+            if last is None or np.asarray(last)[at] != newest:
+                raise ProblemError(
+                    f"{self.name}: control '{name}' has a Rate and a Delay: its last_input is the "
+                    f"newest of its history, {newest:g}; give it so"
+                )
 
     def _check_start(self) -> None:
         """Evaluate everything once at the start: NaN in data or a singular start shows here."""

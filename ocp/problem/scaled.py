@@ -99,7 +99,7 @@ def scaled(ocp: OCP) -> "ScaledOCP | None":
 
 def row_sizes(ocp: OCP) -> RowSizes | None:
     """Return what the rows of a problem are measured in where it is scaled; None: 1."""
-    in_sizes = scaled(ocp)
+    in_sizes = scaled(ocp.explicit)
     if in_sizes is None:
         return None
     sizes, rows = in_sizes.sizes, ocp.rows

@@ -106,13 +106,9 @@ class Statement(Portable):
         last = ca.vertcat(*[ca.SX.sym(f"last {name}") for name in names])
         return (*known, PastInput(last, np.asarray(self.last_input), "last_input"))
 
-    @property
+    @cached_property
     def control_rates(self) -> ControlRates:
         """The rates, stacked in the order of the controls."""
-        return self._control_rates
-
-    @cached_property
-    def _control_rates(self) -> ControlRates:
         return ControlRates.of(self.name, self.model, self.rates)
 
     @property

@@ -73,10 +73,12 @@ def _with_nearest(d, looks: np.ndarray, values: np.ndarray) -> tuple[np.ndarray,
 @once_per_problem
 def _differences(ocp: OCP) -> ca.Function | None:
     """Return (t, p) -> what is zero where a comparison of time alone changes, or None."""
+    ocp = ocp.explicit
     m = ocp.model
     signals = [entry.symbol for entry in ocp.moving]
     others = ca.vertcat(m.x, m.u, *signals)
-    terms = [m.f, ca.SX(ocp.running_cost), *[c.expression for c in ocp.at("path")]]
+    along = (*ocp.at("path"), *ocp.at("integral"), *ocp.peaks)
+    terms = [m.f, ca.SX(ocp.running_cost), *[c.expression for c in along]]
     found: dict[int, ca.SX] = {}
     for node in operations(ca.vertcat(*terms)):
         if node.op() in (ca.OP_LT, ca.OP_LE):

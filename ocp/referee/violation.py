@@ -42,7 +42,7 @@ def peaks(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
     ocp = solution.problem
     if not ocp.peaks:
         return np.empty(0)
-    values = np.vstack(_along_steps(ocp, ocp.functions.peaks, stacked(ocp.peaks), truth))
+    values = np.vstack(_along_steps(ocp, ocp.functions.peaks, stacked(ocp.explicit.peaks), truth))
     return largest(ocp.peaks, values)
 
 

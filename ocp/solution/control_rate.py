@@ -5,10 +5,11 @@ from math import comb
 import numpy as np
 
 from ocp.normal_form.normal_form import normal_form
+from ocp.problem.scaled import sizes_of
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
 from ocp.solution.solution import Solution
 
-# Values that differ by less, relative to 1 + abs(u), are the same: no jump.
+# Values that differ by less, relative to the size of u, are the same: no jump.
 _ROUNDING = 1e-9
 
 
@@ -101,7 +102,8 @@ def _jumps(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
         first = _last_input(solution, after[0])
         before = np.vstack([first, pieces.coefficients[:-1, -1]])
     step = after - before
-    is_jump = np.abs(step) > _ROUNDING * (1.0 + np.abs(after))
+    size = sizes_of(solution.problem).u[solution.problem.control_rates.index]
+    is_jump = np.abs(step) > _ROUNDING * (size + np.abs(after))
     return np.where(is_jump, np.copysign(np.inf, step), 0.0), when
 
 
