@@ -26,7 +26,8 @@ def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     interval sees no jump inside it.
     Twice as many are then the same ones halved, unless as many equal ones hit the knots.
     Where there are more knots than intervals, those at which the declared samples bend are
-    taken in, then those at which they jump, then none but instants. In discrete time the steps are the nodes.
+    taken in, then those at which they jump, then none but instants. In discrete time the steps are
+    the nodes.
 
     Args:
         ocp: the problem.
