@@ -123,7 +123,7 @@ def test_a_loop_takes_a_badly_scaled_problem_with_algebraic_variables() -> None:
     model = Model(name="large", x=x, u=u, f=1e6 * u - z, z=z, algebraic=z - x)
     ocp = pulled(model, x0=[1e6], running_cost=(x / 1e6) ** 2 + u**2)
     decision = MPC(ocp=ocp, solver=MultipleShooting(10), dt=0.1).step([1e6], 0.0)
-    assert decision.status.is_success
+    assert decision.source.name == "OPTIMAL"
 
 
 def test_a_pulse_by_the_clock_that_a_variable_times_is_seen() -> None:
