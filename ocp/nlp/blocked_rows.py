@@ -26,7 +26,7 @@ def rows_by_stage(
     if blocks is None:
         rows = ca.vertcat(gaps, inside)
         return [rows[:, 0], ca.vec(rows[:, 1:])]
-    own, ahead = u[: blocks.controls, :], [*blocks.follows[1:], False]
+    own, ahead = u[blocks.held.tolist(), :], [*blocks.follows[1:], False]
     return [
         ca.vertcat(gaps[:, k], *([own[:, k + 1] - own[:, k]] if goes_on else []), inside[:, k])
         for k, goes_on in enumerate(ahead)
@@ -37,7 +37,7 @@ def held_rows(ocp: OCP, blocks: ControlBlocks | None) -> tuple[list[ConstraintRo
     """Return what holds the controls of an interval, and the intervals at whose start it does."""
     if blocks is None:
         return [], set()
-    names = ocp.model.u_names[: blocks.controls]
+    names = [ocp.model.u_names[i] for i in blocks.held]
     held = [ConstraintRow(f"block of {name}", "time", 1, 0.0, 0.0) for name in names]
     return held, set(np.flatnonzero(blocks.follows).tolist())
 
@@ -46,6 +46,7 @@ def on_held_controls(ocp: OCP, blocks: ControlBlocks | None) -> np.ndarray:
     """Return which path rows say the same all over a block, bool (m,)."""
     if blocks is None:
         return np.zeros(len(ocp.rows.path), dtype=bool)
-    others = [ocp.model.x, ocp.model.u[blocks.controls :], ocp.model.t, ocp.p]
+    free = [i for i in range(ocp.model.nu) if i not in blocks.held]
+    others = [ocp.model.x, ocp.model.u[free], ocp.model.t, ocp.p]
     others = ca.vertcat(*map(ca.vec, others))
     return ~depends_on(ocp.rows.path.expression, others)

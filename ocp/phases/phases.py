@@ -1,6 +1,6 @@
 """Several problems one after another, as a user writes them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ocp.checks.arguments import check_instance
@@ -68,18 +68,9 @@ class Phases(Chain, CompositeProblem[PhasesSolution]):
                 "coupled; MultipleShooting, Collocation and IndirectShooting do"
             )
         side = side_by_side(self)
-        self._refuse_blocked_slacks(solver)
-        program = solver.unjudged().build(side.problem)
+        unjudged = solver.unjudged()
+        if isinstance(unjudged, BlockingSolver):
+            unjudged = replace(unjudged, blocked=side.own_controls)
+        program = unjudged.build(side.problem)
         accuracy = solver.success_accuracy if solver.judged else float("inf")
         return PhasesProgram(side, program, accuracy, solver.end_slack)
-
-    def _refuse_blocked_slacks(self, solver: Solver) -> None:
-        """Refuse blocks where a phase has slacks, which stand between the controls of all."""
-        if not (isinstance(solver, BlockingSolver) and solver.blocks):
-            return
-        for phase in self.phases:
-            if any(c.soft is not None and c.at == "path" for c in phase.constraints):
-                raise UnsupportedProblem(
-                    f"{self.name}: blocks would hold the slacks of phase '{phase.name}' too: write "
-                    "its soft constraint with a quadratic price alone, or take no blocks"
-                )

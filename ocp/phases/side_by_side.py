@@ -112,6 +112,12 @@ class SideBySide(Portable):
             found.append(ca.Function("link", [m.x, m.t, ocp.p], outputs))
         return tuple(found)
 
+    @property
+    def own_controls(self) -> tuple[str, ...]:
+        """Names of the controls that phases were written with, and of their rates."""
+        names = [(lane, name) for lane in self.lanes for name in lane.phase.model.u_names]
+        return tuple(lane.named(f"{of}{name}") for lane, name in names for of in ("", "rate of "))
+
     def durations(self, unknowns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the durations of all phases [s], for values of the unknown constants."""
         each = [

@@ -15,28 +15,28 @@ class ControlBlocks:
 
     Attributes:
         leaders: the interval with which the block of each begins, (N,).
-        controls: how many controls are held, the first ones; slacks behind them are not.
+        held: which controls are held, (m,); slacks beside them are not.
     """
 
     leaders: np.ndarray
-    controls: int
+    held: np.ndarray
 
     @classmethod
     def of(
-        cls, lengths: Sequence[int], intervals: int, controls: int, what: str
+        cls, lengths: Sequence[int], intervals: int, held: Sequence[int], what: str
     ) -> "ControlBlocks | None":
         """Lay blocks on a grid; None where there are none.
 
         Args:
             lengths: number of intervals in each block; the last one goes on to the end.
             intervals: N.
-            controls: how many are held.
+            held: which controls are held.
             what: how a message begins.
 
         Raises:
             ProblemError: if the blocks are longer than the grid.
         """
-        if not lengths or not controls:
+        if not lengths or not held:
             return None
         total = sum(lengths)
         if total > intervals:
@@ -46,27 +46,27 @@ class ControlBlocks:
             )
         own = np.array(lengths)
         own[-1] += intervals - total
-        return cls(np.repeat(np.cumsum(own) - own, own), controls)
+        return cls(np.repeat(np.cumsum(own) - own, own), np.array(held))
 
     @property
     def follows(self) -> np.ndarray:
         """Which intervals go on with the control of the one before, bool (N,)."""
         return self.leaders < np.arange(len(self.leaders))
 
-    def held(self, u: np.ndarray) -> np.ndarray:
+    def holding(self, u: np.ndarray) -> np.ndarray:
         """Return controls (N, nu) with those of the first interval in every block."""
         u = u.copy()
-        u[:, : self.controls] = u[self.leaders, : self.controls]
+        u[:, self.held] = u[self.leaders[:, None], self.held]
         return u
 
     def mean(self, slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Return slopes (N, nu) with the mean of every block, by the weights (N,)."""
         count, slopes = len(weights), slopes.copy()
-        own = slopes[:, : self.controls] * weights[:, None]
+        own = slopes[:, self.held] * weights[:, None]
         total = np.zeros_like(own)
         np.add.at(total, self.leaders, own)
         length = np.bincount(self.leaders, weights, count)
-        slopes[:, : self.controls] = total[self.leaders] / length[self.leaders, None]
+        slopes[:, self.held] = total[self.leaders] / length[self.leaders, None]
         return slopes
 
 

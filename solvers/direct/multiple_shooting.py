@@ -209,7 +209,7 @@ class MultipleShootingProgram(MethodProgram):
     ) -> tuple[np.ndarray, np.ndarray]:
         x, u = self.grid.first_iterate(data, guess, duration, source)
         blocks, length = self.transcription.blocks, duration / self.transcription.time_unit
-        u = u if blocks is None else blocks.held(u)
+        u = u if blocks is None else blocks.holding(u)
         return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
 
     def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
@@ -233,7 +233,9 @@ class MultipleShootingProgram(MethodProgram):
         """The last result, with the work of all runs."""
         result = outcome.last
         z, u = tr.split(result.w)
-        u = u if tr.blocks is None else tr.blocks.held(u)  # without the rounding of its equations
+        u = (
+            u if tr.blocks is None else tr.blocks.holding(u)
+        )  # without the rounding of its equations
         return RunResult(
             status=outcome.status,
             message=outcome.message,

@@ -117,7 +117,7 @@ class Objective:
     def rolled_out(self, u: np.ndarray) -> LineSearchTrial:
         """Integrate (3.61) forwards along controls (N, nu), clipped to their bounds."""
         u, x0, blocks = self.box.clip(u), self.data.x0, self.sweeps.blocks
-        u = u if blocks is None else blocks.held(u)
+        u = u if blocks is None else blocks.holding(u)
         x, costs = self.sweeps.forwards(x0, u.T, *self._schedule)
         self.rollouts += 1
         x = np.vstack([x0, x.T])

@@ -55,8 +55,8 @@ class MPCForm(ABC):
         self.lq, self.blocks = lq, blocks
         # The steps that go on with the control of the one before, and which controls do.
         self._later = np.flatnonzero(blocks.follows) if blocks else np.empty(0, dtype=int)
-        self._held = slice(0, blocks.controls if blocks else 0)
-        self.equations = defects + self._later.size * self._held.stop
+        self._held = blocks.held if blocks else np.empty(0, dtype=int)
+        self.equations = defects + self._later.size * self._held.size
         self.H, self.G = sp.csc_matrix((0, 0)), sp.csc_matrix((0, 0))
         on_control = [row for row, on in zip(lq.rows, lq.on_control, strict=True) if on]
         first = [FormPosition.of(row, 0) for row in on_control]
@@ -152,15 +152,15 @@ class Sparse(MPCForm):
         steps, n = self._after.shape
         on, count = self.lq.on_control, len(self.lq.rows)
         defects = np.arange(steps * n).reshape(steps, n)
-        held = np.arange(steps * n, self.equations).reshape(-1, max(1, self._held.stop))
+        held = np.arange(steps * n, self.equations).reshape(-1, max(1, self._held.size))
         first = self.equations + np.arange(int(on.sum()))[None]
         middle = self.equations + first.size + np.arange((steps - 1) * count)
         middle = middle.reshape(steps - 1, count)
         end = self.equations + first.size + middle.size + np.arange(len(self.lq.end_rows))[None]
-        same = np.repeat(np.eye(self._held.stop)[None], len(held), axis=0)
+        same = np.repeat(np.eye(self._held.size)[None], len(held), axis=0)
         return [
-            _Block(held, self._u[self._later, self._held], same),
-            _Block(held, self._u[self._later - 1, self._held], -same),
+            _Block(held, self._u[np.ix_(self._later, self._held)], same),
+            _Block(held, self._u[np.ix_(self._later - 1, self._held)], -same),
             _Block(defects, self._after, np.repeat(np.eye(n)[None], steps, axis=0)),
             _Block(defects[1:], self._after[:-1], -m.A[1:]),
             _Block(defects, self._u, -m.B),
@@ -256,15 +256,15 @@ class Condensed(MPCForm):
         """Return the adjoint of cost and constraints."""
         m, (stage, end) = data.matrices, self.split(y)
         slope, n = 2.0 * half + (stage[:, None] @ m.D)[:, 0], len(x_end)
-        by_u, held = slope[:, n:], y[: self.equations].reshape(self._later.size, self._held.stop)
-        by_u[self._later, self._held] += held
-        by_u[self._later - 1, self._held] -= held
+        by_u, held = slope[:, n:], y[: self.equations].reshape(self._later.size, self._held.size)
+        by_u[np.ix_(self._later, self._held)] += held
+        by_u[np.ix_(self._later - 1, self._held)] -= held
         final = 2.0 * (m.P @ x_end + data.p) + end @ m.D_f
         return self._stacked.costates(slope[:, :n], by_u, final)
 
     def _changes(self, u: np.ndarray) -> np.ndarray:
         """Return by how much the controls (N, nu, ...) change where they are held."""
-        return u[self._later, self._held] - u[self._later - 1, self._held]
+        return u[np.ix_(self._later, self._held)] - u[np.ix_(self._later - 1, self._held)]
 
 
 class _Block(NamedTuple):

@@ -293,9 +293,9 @@ def test_ratios_that_are_none(ratio):
 def test_blocks_fill_a_grid_or_are_refused(lengths, intervals):
     if sum(lengths) > intervals:
         with pytest.raises(ProblemError, match="intervals long, the grid has"):
-            ControlBlocks.of(lengths, intervals, 1, "here")
+            ControlBlocks.of(lengths, intervals, [0], "here")
         return
-    blocks = ControlBlocks.of(lengths, intervals, 1, "here")
+    blocks = ControlBlocks.of(lengths, intervals, [0], "here")
     if not lengths:
         assert blocks is None
         return

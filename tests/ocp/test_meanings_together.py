@@ -191,10 +191,28 @@ def test_instants_of_two_constraints_are_counted_once() -> None:
 
 
 def test_blocks_of_phases_hold_no_slacks() -> None:
+    """Beside a phase that costs nothing, one phase is what it is alone."""
     soft = Constraint("slow", x, upper=0.1, soft=Soft(linear=1.0))
-    chain = Phases("two", (pulled(name="one", constraints=(soft,)), pulled(name="two")))
-    with pytest.raises(UnsupportedProblem, match="slacks of phase 'one'"):
-        solve(chain, MultipleShooting(8, blocks=(4, 4)))
+    one = pulled(name="one", constraints=(soft,))
+    idle = pulled(name="idle", running_cost=0.0)
+    alone = solve(one, MultipleShooting(8, blocks=(4, 4)))
+    beside = solve(Phases("two", (one, idle)), MultipleShooting(8, blocks=(4, 4)))
+    assert beside.cost == pytest.approx(alone.cost, abs=1e-6)
+
+
+def test_blocks_hold_the_rate_of_a_control_and_no_slack() -> None:
+    """In the least violating plan too, whose slack stands between."""
+    rated = pulled(
+        rates=(Rate(u, -1, 1),),
+        last_input=[0.0],
+        constraints=(Constraint("far", x, lower=0.4, upper=9),),
+    )
+    program = MultipleShooting(8, blocks=(4, 4)).least_violating(rated)
+    assert program is not None
+    plan = program.run()
+    rates = np.diff(plan.control(plan.t)[:, 0]) / np.diff(plan.t)
+    assert np.ptp(rates[:4]) < 1e-6
+    assert np.ptp(rates[4:]) < 1e-6
 
 
 def test_phases_take_the_last_input_of_a_run() -> None:
