@@ -233,9 +233,8 @@ class MultipleShootingProgram(MethodProgram):
         """The last result, with the work of all runs."""
         result = outcome.last
         z, u = tr.split(result.w)
-        u = (
-            u if tr.blocks is None else tr.blocks.holding(u)
-        )  # without the rounding of its equations
+        if tr.blocks is not None:  # without the rounding of its equations
+            u = tr.blocks.holding(u)
         return RunResult(
             status=outcome.status,
             message=outcome.message,
