@@ -1,6 +1,7 @@
 """The native backend of multiple shooting against IPOPT on the same program, and its failures."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -12,7 +13,7 @@ from ocp import MPC, OCP, Guess, InputSource, Plant, Status, UnsupportedProblem,
 from ocp.codegen.compile import Compiler
 from ocp.internal import Transcription
 from solvers import MultipleShooting
-from solvers.direct.native import lane_code
+from solvers.direct.native import lane_code, native_library, native_solve
 from solvers.direct.native.native_library import NativeLibrary
 from solvers.direct.native.stage_code import StageCode
 from tests.native.problems import (
@@ -112,9 +113,58 @@ def test_the_optimum_costs_the_same_in_machine_code_of_another_horizon() -> None
         assert native.or_raise().cost == pytest.approx(ipopt.or_raise().cost, rel=SAME_OPTIMUM)
 
 
+def test_a_pause_after_every_iteration_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = NATIVE.build(swing())
+    whole = program.run().or_raise()
+    monkeypatch.setattr(native_solve, "_PAUSE", 0.0)
+    paused = program.run().or_raise()
+    np.testing.assert_array_equal(paused.x, whole.x)
+    np.testing.assert_array_equal(paused.history["cost"], whole.history["cost"])
+    assert paused.iterations == whole.iterations > 3
+
+
+def test_blocks_are_refused_by_name() -> None:
+    solver = MultipleShooting(8, backend="native", blocks=(1, 2, 2))
+    with pytest.raises(UnsupportedProblem, match="swing: the native backend takes no blocks"):
+        solver.build(swing())
+
+
+def test_a_start_that_is_data_is_refused_by_name() -> None:
+    transcription = Transcription(swing(), 8, NATIVE.integrator, start_as_data=True)
+    with pytest.raises(UnsupportedProblem, match="takes no start that is data"):
+        NATIVE.nlp_backend.build(transcription)
+
+
 def test_a_mistake_of_the_compiler_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(lane_code._OPERATORS, ca.OP_SIN, "lanes_cos({0})")
     with pytest.raises(UnsupportedProblem, match="gives other numbers than CasADi"):
+        NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_mistake_in_any_function_and_lane_is_noticed(order: int) -> None:
+    library = NativeLibrary.of(StageCode(Transcription(swing(), 6, NATIVE.integrator)))
+    touched = (library.arrays.v, library.arrays.c_slope, library.arrays.hessian)[order]
+    for place in (0, touched.shape[0] // 2, touched.shape[0] - 1):
+
+        def wrong(up_to: int, place: int = place) -> float:
+            cost = library.evaluate(up_to)
+            if up_to == order:
+                touched[place] += 1.0
+            return cost
+
+        found = native_library.first_difference(library.code, library.arrays, wrong)
+        assert found is not None
+        assert found.endswith(f"at order {order}")
+
+
+def test_a_library_that_cannot_be_loaded_is_a_named_error(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken.so"
+    broken.write_text("no machine code")
+    monkeypatch.setattr(native_library, "built_library", lambda *_: broken)
+    with pytest.raises(UnsupportedProblem, match=r"swing: .* cannot be loaded"):
         NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
 
 
