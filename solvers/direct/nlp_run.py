@@ -107,7 +107,7 @@ class NlpRun:
         outcome = self._run(nlp, inputs, inputs.w0)
         if self._hands_over(nlp) and self._is_handed_over(outcome):
             other, answering = self.first_solve(inputs, self._ipopt)
-            return other.after(outcome).told_by(_HANDED_OVER), answering
+            return other.after(outcome), answering
         if outcome.status is Status.FAILED and outcome.last.success:
             outcome = self._run(nlp, inputs, outcome.last.w).after(outcome)
         return outcome, nlp
@@ -315,7 +315,9 @@ class NlpRun:
         result = nlp.solve(w, inputs.p, inputs.bounds, costate)
         verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
         judged = verdict.judge(inputs, result)
-        return NlpOutcome((judged.result,), judged.status, judged.message)
+        outcome = NlpOutcome((judged.result,), judged.status, judged.message)
+        is_handed_over = self._hands_over(self.nlp) and nlp is not self.nlp
+        return outcome.told_by(_HANDED_OVER) if is_handed_over else outcome
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""

@@ -34,7 +34,9 @@
 /* Pairs that a filter remembers; beyond, the oldest is forgotten. */
 #define FILTER 64
 /* Iterations of which something is noted; beyond, the last note is that of the newest. */
+#ifndef NOTED
 #define NOTED 512
+#endif
 
 typedef struct {
   double tolerance;     /* of the optimality conditions */
