@@ -9,7 +9,20 @@ import pytest
 
 from benchmarks.cases import all_cases
 from models import cart_pole_upright
-from ocp import MPC, OCP, Guess, InputSource, Plant, Status, UnsupportedProblem, evaluate, solve
+from ocp import (
+    MPC,
+    OCP,
+    Guess,
+    InputSource,
+    Model,
+    Plant,
+    Radau,
+    Status,
+    Table,
+    UnsupportedProblem,
+    evaluate,
+    solve,
+)
 from ocp.codegen.compile import Compiler
 from ocp.internal import Transcription
 from solvers import MultipleShooting
@@ -139,6 +152,19 @@ def test_blocks_are_refused_by_name() -> None:
     solver = MultipleShooting(8, backend="native", blocks=(1, 2, 2))
     with pytest.raises(UnsupportedProblem, match="swing: the native backend takes no blocks"):
         solver.build(swing())
+
+
+def test_what_cannot_be_written_as_c_is_refused_by_name() -> None:
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    places = np.linspace(-5.0, 5.0, 12)
+    drag = Table(places, 0.1 * places**2, beyond="extend", name="drag")
+    for force in (drag(x), ca.erfinv(0.1 * x)):
+        model = Model(name="mass", x=x, u=u, f=u - force)
+        ocp = OCP(name="drawn", model=model, x0=[1.0], horizon=1.0, running_cost=u**2)
+        with pytest.raises(UnsupportedProblem, match="drawn: the native backend cannot write"):
+            NATIVE.build(ocp)
+    with pytest.raises(UnsupportedProblem, match="explicit integrators, not Radau"):
+        replace(NATIVE, integrator=Radau()).build(swing())
 
 
 def test_a_start_that_is_data_is_refused_by_name() -> None:

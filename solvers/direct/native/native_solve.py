@@ -145,12 +145,11 @@ class NativeSolve:
 
 def _remainder(result: NlpResult) -> float:
     """Return what a result leaves of the optimality conditions; inf where it is not finite."""
-    if not result.is_finite:
-        return np.inf
-    if result.success:
-        return 0.0
     report: NativeReport = result.stats["report"]
-    return max(report.primal, report.dual, report.product)
+    left = np.max([report.primal, report.dual, report.product])
+    if not (result.is_finite and np.isfinite(left)):
+        return np.inf
+    return 0.0 if result.success else float(left)
 
 
 def _stats(
