@@ -28,7 +28,7 @@ from solvers.direct.fitted_multipliers import with_fitted_multipliers
 from solvers.direct.native.native_library import NativeLibrary, NativeReport
 from solvers.direct.native.native_solve import NativeLimits, NativeSolve
 from solvers.direct.native.stage_code import StageCode
-from solvers.direct.nlp_result import HUGE, NlpResult
+from solvers.direct.nlp_result import HUGE, Bounds, NlpResult
 from solvers.direct.optimality_residual import OptimalityCheck, OptimalityResidual
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
@@ -94,7 +94,7 @@ class NlpBackend:
             f"{self.name}.max_iter": self.max_iterations,
         }
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
-        return CasadiNlp(self, function, self._subprocess(function))
+        return CasadiNlp(self, function, transcription.is_control, self._subprocess(function))
 
     def _native(self, transcription: TranscribedProblem) -> "NativeNlp":
         if not isinstance(transcription, Transcription):
@@ -153,7 +153,7 @@ class Nlp(Protocol):
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the backend; return the first iterate where its result is not finite.
@@ -166,26 +166,17 @@ class Nlp(Protocol):
         """
         ...
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return how well a result meets the first-order conditions, without any scaling."""
         ...
 
-    def judged(
-        self,
-        result: NlpResult,
-        p: np.ndarray,
-        bounds: dict[str, np.ndarray],
-        is_control: np.ndarray,
-    ) -> NlpResult:
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
         """Return a result that meets the constraints with a residual, whatever the backend says.
 
         Args:
             result: of one run; its residual stays None where it is that of no iterate.
             p: data of the problem.
             bounds: lbx, ubx, lbg, ubg.
-            is_control: which unknowns are controls, bool (size,).
         """
         ...
 
@@ -197,18 +188,20 @@ class CasadiNlp:
     Attributes:
         backend: the options.
         function: the ``casadi.nlpsol``.
+        is_control: which unknowns are controls, bool (size,).
         subprocess: the process that it runs in; None: this one.
     """
 
     backend: NlpBackend
     function: ca.Function
+    is_control: np.ndarray
     subprocess: SubprocessFunction | None = None
 
     def solve(
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the backend, see ``Nlp``; costates are of no use to it."""
@@ -232,23 +225,15 @@ class CasadiNlp:
         """What runs it in this process."""
         return BufferedNlp(self.function)
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return how well a result meets the first-order conditions, see ``Nlp``."""
         return self._check(result, p, bounds)
 
-    def judged(
-        self,
-        result: NlpResult,
-        p: np.ndarray,
-        bounds: dict[str, np.ndarray],
-        is_control: np.ndarray,
-    ) -> NlpResult:
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
         """Return it with fitted multipliers, see ``Nlp``."""
         if not self._check.is_value(result, p):
             return result
-        return with_fitted_multipliers(self.function, result, p, bounds, is_control)
+        return with_fitted_multipliers(self.function, result, p, bounds, self.is_control)
 
     @cached_property
     def _check(self) -> OptimalityCheck:
@@ -283,26 +268,18 @@ class NativeNlp:
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the solver, see ``Nlp``."""
         return self.run(w0, p, bounds, costate)
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return its own residual: it is not scaled."""
         report: NativeReport = result.stats["report"]
         return OptimalityResidual(report.dual, report.multiplier)
 
-    def judged(
-        self,
-        result: NlpResult,
-        p: np.ndarray,
-        bounds: dict[str, np.ndarray],
-        is_control: np.ndarray,
-    ) -> NlpResult:
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
         """Return it with its own residual, which is not scaled, see ``Nlp``."""
         report: NativeReport = result.stats["report"]
         return replace(result, residual=max(report.dual, report.product))

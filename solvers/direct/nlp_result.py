@@ -1,12 +1,14 @@
 """What one run of a backend returns, with finite numbers only but for the cost."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ocp import Work
 
+#: lbx, ubx, lbg and ubg of a program.
+Bounds: TypeAlias = dict[str, np.ndarray]
 #: From this on a number counts as not finite.
 HUGE = 1e300
 

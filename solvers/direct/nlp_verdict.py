@@ -96,8 +96,7 @@ class NlpVerdict:
 
     def _judge_unfinished(self, inputs: NlpInputs, result: NlpResult) -> JudgedResult:
         """Accept a result that meets the constraints but not the backend's tolerance, or not."""
-        is_control = self.transcription.is_control
-        fitted = self.nlp.judged(result, inputs.p, inputs.bounds, is_control)
+        fitted = self.nlp.judged(result, inputs.p, inputs.bounds)
         if fitted.residual is None or fitted.residual > _ACCEPTABLE:
             return JudgedResult(result, *self._judge_failure(result, ""))
         said = f"to an acceptable level: residual {fitted.residual:.1g}"
