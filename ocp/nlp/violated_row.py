@@ -16,6 +16,8 @@ def most_violated(
 ) -> tuple[float, ConstraintRow | None]:
     """Return the largest violation of any row or bound, and which it is; 0 and None if none is.
 
+    What is no number violates by inf.
+
     Args:
         w: unknowns (size,).
         g: values of the rows (m,).
@@ -25,6 +27,7 @@ def most_violated(
     """
     in_g = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
     in_w = np.maximum(bounds["lbx"] - w, w - bounds["ubx"])
+    in_g, in_w = (np.where(np.isnan(each), np.inf, each) for each in (in_g, in_w))
     if max(in_g.max(initial=0.0), in_w.max(initial=0.0)) <= 0.0:
         return 0.0, None
     if in_g.max(initial=0.0) >= in_w.max():

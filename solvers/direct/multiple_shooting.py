@@ -47,8 +47,8 @@ class MultipleShooting(BlockingSolver):
             brings its own number. Or a ``Grid`` of unequal ones.
         integrator: one-step method in each interval.
         backend: ``"ipopt"``; ``"fatrop"``, which exploits the stages; or ``"native"``, which does
-            so in C that is generated for the problem: it needs a C compiler, and starts warm from
-            a guess with costates.
+            so in C that is generated for the problem: it needs a C compiler, starts warm from a
+            guess with costates, and takes no ``blocks``.
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
@@ -63,7 +63,8 @@ class MultipleShooting(BlockingSolver):
             returns no iterate: ``FAILED``.
         feasibility_restoration: after a failure, find the trajectory that violates the
             constraints least: it tells whether the problem is infeasible, and is a better first
-            iterate if it is not; after that, try other first iterates. Each may cost 300
+            iterate if it is not; after that, try other first iterates. After a failure of the
+            native backend IPOPT runs, before all that. Each may cost 300
             iterations; turn it off in a controller with a deadline.
         blocks: over how many intervals each control is held; the last one goes on to the end, so
             that ``(1, 1, 2)`` leaves three moves (a control horizon); none: each over one.

@@ -23,10 +23,12 @@ from ocp.internal import (
     check_whole,
     refuse_in_subprocess,
 )
+from solvers.direct.fatrop_options import fatrop_options
+from solvers.direct.fitted_multipliers import with_fitted_multipliers
 from solvers.direct.native.native_library import NativeLibrary, NativeReport
 from solvers.direct.native.native_solve import NativeLimits, NativeSolve
 from solvers.direct.native.stage_code import StageCode
-from solvers.direct.nlp_result import NlpResult
+from solvers.direct.nlp_result import HUGE, Bounds, NlpResult
 from solvers.direct.optimality_residual import OptimalityCheck, OptimalityResidual
 from solvers.direct.subprocess_function import (
     SUBPROCESS_SUPPORTED,
@@ -34,9 +36,6 @@ from solvers.direct.subprocess_function import (
     SubprocessLost,
 )
 from solvers.direct.transcribed_problem import TranscribedProblem
-
-# Beyond this a number counts as not finite.
-_HUGE = 1e300
 
 
 @dataclass(frozen=True)
@@ -86,19 +85,31 @@ class NlpBackend:
             return self._native(transcription)
         if self.name == "fatrop" and self.time_limit < np.inf:
             refuse_in_subprocess(transcription.ocp)
-        own = self._ipopt() if self.name == "ipopt" else self._fatrop(transcription)
+        own = (
+            self._ipopt() if self.name == "ipopt" else fatrop_options(transcription, self.tolerance)
+        )
         common = QUIET | {
             "print_time": self.verbose,
             f"{self.name}.print_level": 5 if self.verbose else 0,
             f"{self.name}.max_iter": self.max_iterations,
         }
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
-        return CasadiNlp(self, function, self._subprocess(function))
+        return CasadiNlp(self, function, transcription.is_control, self._subprocess(function))
 
     def _native(self, transcription: TranscribedProblem) -> "NativeNlp":
         if not isinstance(transcription, Transcription):
             raise UnsupportedProblem(
                 "the native backend takes the stages of multiple shooting alone"
+            )
+        if transcription.blocks is not None:
+            raise UnsupportedProblem(
+                f"{transcription.ocp.name}: the native backend takes no blocks; "
+                "take backend='ipopt' or 'fatrop'"
+            )
+        if transcription.start_as_data:
+            raise UnsupportedProblem(
+                f"{transcription.ocp.name}: the native backend takes no start that is data; "
+                "take backend='ipopt'"
             )
         options = NativeLimits(self.tolerance, self.max_iterations, self.time_limit)
         library = NativeLibrary.of(StageCode(transcription))
@@ -124,17 +135,6 @@ class NlpBackend:
         rows = {"ipopt.perturb_always_cd": "yes"} if self.dependent_rows else {}
         return {"ipopt.sb": "yes", "ipopt.tol": self.tolerance, **relax, **clock, **rows}
 
-    def _fatrop(self, transcription: TranscribedProblem) -> dict[str, Any]:
-        if not isinstance(transcription, Transcription):
-            raise UnsupportedProblem("fatrop takes the stages of multiple shooting alone")
-        _refuse_for_fatrop(transcription)
-        return {
-            "structure_detection": "auto",
-            "equality": [row.is_equation for row in transcription.rows],
-            "fatrop.tolerance": self.tolerance,
-            "cache": {"nlp_grad": _clamped_values(transcription)},
-        }
-
 
 class Nlp(Protocol):
     """A backend set up for one problem."""
@@ -153,7 +153,7 @@ class Nlp(Protocol):
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the backend; return the first iterate where its result is not finite.
@@ -166,10 +166,18 @@ class Nlp(Protocol):
         """
         ...
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return how well a result meets the first-order conditions, without any scaling."""
+        ...
+
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
+        """Return a result that meets the constraints with a residual, whatever the backend says.
+
+        Args:
+            result: of one run; its residual stays None where it is that of no iterate.
+            p: data of the problem.
+            bounds: lbx, ubx, lbg, ubg.
+        """
         ...
 
 
@@ -180,18 +188,20 @@ class CasadiNlp:
     Attributes:
         backend: the options.
         function: the ``casadi.nlpsol``.
+        is_control: which unknowns are controls, bool (size,).
         subprocess: the process that it runs in; None: this one.
     """
 
     backend: NlpBackend
     function: ca.Function
+    is_control: np.ndarray
     subprocess: SubprocessFunction | None = None
 
     def solve(
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the backend, see ``Nlp``; costates are of no use to it."""
@@ -204,7 +214,7 @@ class CasadiNlp:
         except SubprocessLost as loss:
             stats = {"return_status": str(loss), "success": False}
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats, is_lost=True)
-        if not all((np.abs(raw[name]) < _HUGE).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
+        if not all((np.abs(raw[name]) < HUGE).all() for name in ("x", "f", "g", "lam_x", "lam_g")):
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         # An interior point may violate a bound by rounding; the result does not.
         w = np.clip(raw["x"], bounds["lbx"], bounds["ubx"])
@@ -215,11 +225,15 @@ class CasadiNlp:
         """What runs it in this process."""
         return BufferedNlp(self.function)
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return how well a result meets the first-order conditions, see ``Nlp``."""
         return self._check(result, p, bounds)
+
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
+        """Return it with fitted multipliers, see ``Nlp``."""
+        if not self._check.is_value(result, p):
+            return result
+        return with_fitted_multipliers(self.function, result, p, bounds, self.is_control)
 
     @cached_property
     def _check(self) -> OptimalityCheck:
@@ -242,57 +256,30 @@ class NativeNlp:
 
     @property
     def function(self) -> ca.Function:
-        """IPOPT for the same program, built where its derivatives are asked for: rarely."""
-        return self._ipopt.function
+        """That of IPOPT, for those who ask for derivatives of the whole program."""
+        return self.ipopt.function
 
     @cached_property
-    def _ipopt(self) -> Nlp:
+    def ipopt(self) -> Nlp:
+        """IPOPT for the same program, built where it is asked for: never in a control loop."""
         return replace(self.backend, name="ipopt").build(self.transcription)
 
     def solve(
         self,
         w0: np.ndarray,
         p: np.ndarray,
-        bounds: dict[str, np.ndarray],
+        bounds: Bounds,
         costate: np.ndarray | None = None,
     ) -> NlpResult:
         """Run the solver, see ``Nlp``."""
         return self.run(w0, p, bounds, costate)
 
-    def optimality(
-        self, result: NlpResult, p: np.ndarray, bounds: dict[str, np.ndarray]
-    ) -> OptimalityResidual:
+    def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return its own residual: it is not scaled."""
         report: NativeReport = result.stats["report"]
         return OptimalityResidual(report.dual, report.multiplier)
 
-
-def _clamped_values(transcription: TranscribedProblem) -> ca.Function:
-    """Return cost, constraints and their gradients, as fatrop ends with them; NaN is -1e300.
-
-    Where one of them is not finite CasADi prints a warning, and no option turns that off.
-    """
-    program = transcription.program
-    nlp = ca.Function("nlp", program, ["x", "p"], ["f", "g"])
-    names = ["x", "p", "lam:f", "lam:g"], ["f", "g", "grad:gamma:x", "grad:gamma:p"]
-    exact = nlp.factory("exact", *names, {"gamma": ["f", "g"]})
-    inputs = exact.mx_in()
-    f, g, *gradients = exact.call(inputs)
-    values = [ca.fmin(ca.fmax(value, -_HUGE), _HUGE) for value in (f, g)]
-    own_names = exact.name_in(), exact.name_out()
-    return ca.Function("nlp_grad", inputs, [*values, *gradients], *own_names)
-
-
-def _refuse_for_fatrop(transcription: Transcription) -> None:
-    """Refuse problems that fatrop would end with a printed assertion of its own."""
-    ocp, n = transcription.ocp, transcription.n
-    if any(not c.is_equation for c in ocp.at("initial")):
-        raise UnsupportedProblem(f"{ocp.name}: fatrop takes no inequality at the start; use ipopt")
-    for node, unknowns in ((0, transcription.nz + ocp.model.nu), (n, transcription.nz)):
-        rows = [r for r in transcription.rows if r.node == node and r.is_equation]
-        rows = [r for r in rows if r.place in ("path", "initial", "terminal")]
-        if len(rows) > unknowns:
-            raise UnsupportedProblem(
-                f"{ocp.name}: {len(rows)} equations for {unknowns} unknowns at node {node} "
-                f"(the last is '{rows[-1].name}'); fatrop takes no more equations than unknowns"
-            )
+    def judged(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> NlpResult:
+        """Return it with its own residual, which is not scaled, see ``Nlp``."""
+        report: NativeReport = result.stats["report"]
+        return replace(result, residual=max(report.dual, report.product))

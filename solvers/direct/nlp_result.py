@@ -1,11 +1,16 @@
 """What one run of a backend returns, with finite numbers only but for the cost."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ocp import Work
+
+#: lbx, ubx, lbg and ubg of a program.
+Bounds: TypeAlias = dict[str, np.ndarray]
+#: From this on a number counts as not finite.
+HUGE = 1e300
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +56,12 @@ class NlpResult:
         return str(self.stats.get("return_status", ""))
 
     @property
+    def is_finite(self) -> bool:
+        """Whether every number is one that counts as finite."""
+        arrays = (self.w, self.g, self.lam_x, self.lam_g)
+        return abs(self.cost) < HUGE and all((np.abs(each) < HUGE).all() for each in arrays)
+
+    @property
     def is_undefined(self) -> bool:
         """Whether the backend met a number that is not finite."""
         return not np.isfinite(self.cost) or self.return_status == "Invalid_Number_Detected"
@@ -64,7 +75,9 @@ class NlpResult:
     def work(self) -> Work:
         """Evaluations and factorisations."""
         calls = [int(self.stats.get(f"n_call_nlp_{name}", 0)) for name in ("g", "jac_g")]
-        return Work(*calls, factorisations=self.iterations)
+        # Where a backend does not count them there is at least one an iteration.
+        factorisations = int(self.stats.get("factorisations", self.iterations))
+        return Work(*calls, factorisations=factorisations)
 
     def history(self, name: str) -> np.ndarray:
         """Return a quantity per iteration; empty where the backend records none."""

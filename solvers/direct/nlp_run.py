@@ -17,7 +17,7 @@ from ocp import Status
 from ocp.internal import RunData, start_violation
 from solvers.direct.curvature_check import has_negative_curvature
 from solvers.direct.feasibility_restoration import FeasibilityRestoration, LeastViolation
-from solvers.direct.nlp_backends import Nlp
+from solvers.direct.nlp_backends import NativeNlp, Nlp
 from solvers.direct.nlp_outcome import NlpOutcome, OtherStart
 from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
@@ -60,7 +60,8 @@ class NlpRun:
         accuracy: the largest accepted error of a state, relative to 1 + abs(x).
         state_error: (result, data) -> the largest such error, and the node where it occurs.
         feasibility_restoration: whether a failure is followed by a search for the least
-            violating trajectory, and by other first iterates.
+            violating trajectory, and by other first iterates; and one of the native solver by
+            IPOPT.
     """
 
     transcription: TranscribedProblem
@@ -94,28 +95,35 @@ class NlpRun:
 
     # -- the phases ------------------------------------------------------------------------------
 
-    def first_solve(self, inputs: NlpInputs, nlp: Nlp) -> NlpOutcome:
+    def first_solve(self, inputs: NlpInputs, nlp: Nlp) -> tuple[NlpOutcome, Nlp]:
         """Run a backend from the first iterate, and again where only its scaling was met.
 
-        Where the native solver fails, which has no restoration of its own, IPOPT runs.
+        Where the native solver fails, which has no restoration of its own, IPOPT runs, but not
+        without ``feasibility_restoration``, as in a control loop: there is no time for it.
+
+        Returns:
+            How it has ended, and the backend that has answered.
         """
         outcome = self._run(nlp, inputs, inputs.w0)
-        if nlp.backend.name == "native" and self._is_handed_over(outcome):
-            return self.first_solve(inputs, self._ipopt).after(outcome).told_by(_HANDED_OVER)
+        if self._hands_over(nlp) and self._is_handed_over(outcome):
+            other, answering = self.first_solve(inputs, self._ipopt)
+            return other.after(outcome), answering
         if outcome.status is Status.FAILED and outcome.last.success:
             outcome = self._run(nlp, inputs, outcome.last.w).after(outcome)
-        return outcome
+        return outcome, nlp
 
     def solve_from_perturbed(self, inputs: NlpInputs, first: NlpOutcome, nlp: Nlp) -> NlpOutcome:
         """Run the backend from a perturbation of its result.
 
         A backend tests curvature along its steps only: one that makes none accepts a maximum or
         a saddle as well. From a minimum the second run returns at once. fatrop may return to a
-        saddle even so: then IPOPT decides.
+        saddle even so: then IPOPT decides, and so it does where the native solver fails.
         """
         every = np.ones(self.transcription.ocp.model.nu, dtype=bool)
         w = perturbed(self.transcription, inputs, first.last.w, every)
         second = self._run(nlp, inputs, w)
+        if self._hands_over(nlp) and self._is_handed_over(second):
+            return self.solve_from_perturbed(inputs, first.after(second), self._ipopt)
         is_unknown = second.status is Status.FAILED and not self._is_lower(inputs, second, first)
         if is_unknown and nlp.backend.name == "ipopt" and not nlp.backend.dependent_rows:
             return self.solve_from_perturbed(inputs, first, self._for_dependent_rows)
@@ -137,6 +145,9 @@ class NlpRun:
         """
         w = perturbed(self.transcription, inputs, first.last.w, which)
         second = self._run(nlp, inputs, w)
+        if self._hands_over(nlp) and self._is_handed_over(second):
+            handed = first.after(second)
+            return self.solve_from_some_perturbed(inputs, handed, self._ipopt, which)
         is_lower = self._is_lower(inputs, second, first)
         if second.status.is_success and is_lower:
             return second.after(first)
@@ -217,29 +228,33 @@ class NlpRun:
     def _run_to_an_optimum(self, inputs: NlpInputs, nlp: Nlp | None = None) -> NlpOutcome:
         """Run from a first iterate, and from perturbed controls where some did not move."""
         chosen, problem = nlp or self.nlp, self.transcription
-        first = self.first_solve(inputs, chosen)
-        if nlp is None and self._has_dependent_rows(inputs, first):
+        first, answering = self.first_solve(inputs, chosen)
+        if nlp is None and self._has_dependent_rows(inputs, first, answering):
             return self._run_to_an_optimum(inputs, self._for_dependent_rows).after(first)
         if first.status is not Status.SOLVED or not problem.ocp.model.nu:
             return first
         still = unmoved(problem, inputs, first.last.w)
         if still.all():
-            return self.solve_from_perturbed(inputs, first, chosen)
+            return self.solve_from_perturbed(inputs, first, answering)
         hidden = self._hidden(inputs, first.last.w)
         if not hidden.any():
             return first
-        return self.solve_from_some_perturbed(inputs, first, chosen, hidden)
+        return self.solve_from_some_perturbed(inputs, first, answering, hidden)
+
+    def _hands_over(self, nlp: Nlp) -> bool:
+        """Whether IPOPT runs where this backend fails."""
+        return nlp.backend.name == "native" and self.feasibility_restoration
 
     def _is_handed_over(self, outcome: NlpOutcome) -> bool:
         """Whether the native solver has failed, not for lack of time nor at the first iterate."""
         is_failure = outcome.status in _MAYBE_FIRST_ITERATE and not outcome.last.success
         return is_failure and not outcome.is_undefined
 
-    def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome) -> bool:
+    def _has_dependent_rows(self, inputs: NlpInputs, outcome: NlpOutcome, nlp: Nlp) -> bool:
         """Whether IPOPT failed close to the constraints, with multipliers without bound."""
         if outcome.status not in (Status.FAILED, Status.ITERATION_LIMIT):
             return False
-        last, is_ipopt = outcome.last, self.nlp.backend.name != "fatrop"
+        last, is_ipopt = outcome.last, nlp.backend.name == "ipopt"
         violation, _ = self.transcription.worst(last.w, last.g, inputs.bounds)
         unbounded = np.abs(last.lam_g).max(initial=0.0) > _UNBOUNDED
         return is_ipopt and bool(unbounded) and violation <= _CLOSE
@@ -285,6 +300,8 @@ class NlpRun:
     @cached_property
     def _ipopt(self) -> Nlp:
         """IPOPT for the same program, built where another's answer may be a saddle, or is none."""
+        if isinstance(self.nlp, NativeNlp):
+            return self.nlp.ipopt
         return replace(self.nlp.backend, name="ipopt").build(self.transcription)
 
     def _inputs(self, w0: np.ndarray, data: RunData) -> NlpInputs:
@@ -298,7 +315,9 @@ class NlpRun:
         result = nlp.solve(w, inputs.p, inputs.bounds, costate)
         verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
         judged = verdict.judge(inputs, result)
-        return NlpOutcome((judged.result,), judged.status, judged.message)
+        outcome = NlpOutcome((judged.result,), judged.status, judged.message)
+        is_handed_over = self._hands_over(self.nlp) and nlp is not self.nlp
+        return outcome.told_by(_HANDED_OVER) if is_handed_over else outcome
 
     def times(self, result: NlpResult, data: RunData) -> np.ndarray:
         """Return the instants of the grid [s]."""

@@ -2,17 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from ocp import Status
 from ocp.internal import ConstraintRow, RunData, Violation, start_violation
-from solvers.direct.fitted_multipliers import with_fitted_multipliers
 from solvers.direct.nlp_backends import Nlp
 from solvers.direct.nlp_result import NlpResult
-from solvers.direct.optimality_residual import OptimalityCheck
 from solvers.direct.return_words import ACCEPTABLE, meaning
 from solvers.direct.transcribed_problem import TranscribedProblem
 
@@ -59,7 +56,7 @@ class NlpVerdict:
 
     A result counts as an optimum where constraints and first-order conditions hold without the
     backend's scaling. Where the backend stopped before its tolerance was met, a residual up to
-    5e-4 is accepted, see ``with_fitted_multipliers``, and the message reports it.
+    5e-4 is accepted, see ``Nlp.judged``, and the message reports it.
 
     Attributes:
         transcription: the problem on its grid.
@@ -99,12 +96,7 @@ class NlpVerdict:
 
     def _judge_unfinished(self, inputs: NlpInputs, result: NlpResult) -> JudgedResult:
         """Accept a result that meets the constraints but not the backend's tolerance, or not."""
-        is_control = self.transcription.is_control
-        if not self._residual.is_value(result, inputs.p):
-            return JudgedResult(result, *self._judge_failure(result, ""))
-        fitted = with_fitted_multipliers(
-            self.nlp.function, result, inputs.p, inputs.bounds, is_control
-        )
+        fitted = self.nlp.judged(result, inputs.p, inputs.bounds)
         if fitted.residual is None or fitted.residual > _ACCEPTABLE:
             return JudgedResult(result, *self._judge_failure(result, ""))
         said = f"to an acceptable level: residual {fitted.residual:.1g}"
@@ -148,7 +140,3 @@ class NlpVerdict:
         """Return the instants of the grid [s]."""
         duration = self.transcription.duration(result.w)
         return data.t0 + self.transcription.fractions * duration
-
-    @cached_property
-    def _residual(self) -> OptimalityCheck:
-        return OptimalityCheck(self.nlp.function)

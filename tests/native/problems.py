@@ -86,6 +86,20 @@ def held_still() -> OCP:
     )
 
 
+def rationed() -> OCP:
+    """A mass pulled along, with rows in every stage that hold it back, and a free end."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    return OCP(
+        name="rationed",
+        model=Model(name="mass", x=x, u=u, f=ca.vertcat(x[1], u - 0.2 * x[1] ** 3)),
+        x0=[0.0, 0.4],
+        horizon=1.0,
+        running_cost=u**2,
+        terminal_cost=-5.0 * x[0],
+        constraints=(Constraint("effort", u + x[1], upper=1.1),),
+    )
+
+
 def impossible() -> OCP:
     """A mass that would have to be further than its bounds let it."""
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u")

@@ -147,11 +147,11 @@ def test_derivatives_are_those_of_finite_differences(seed: int) -> None:
             array, entry = (at.u, i) if i < nu else (at.x, i - nu)
             before = array[k, entry]
             array[k, entry] = before + sign * step
-            costs.append(library().evaluate())
+            costs.append(library().evaluate(2))
             slopes.append(at.v.copy())
             gradients.append(library().lagrangian_gradient().copy())
             array[k, entry] = before
-    library().evaluate()
+    library().evaluate(2)
     here = [at.gradient.copy(), at.hessian.copy()]
     count = len(costs) // 3
     entries = [(k, i) for k, i in np.ndindex(N + 1, nu + nx) if k < N or i >= nu]

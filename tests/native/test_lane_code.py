@@ -71,6 +71,28 @@ def test_sine_and_cosine_are_those_of_libm_to_the_last_place() -> None:
     np.testing.assert_array_less(np.abs(found - right), 2.5e-16 + 1e-300)
 
 
+def test_functions_that_are_called_may_have_any_name() -> None:
+    options = {"never_inline": True}
+    parts = [A * B, A - B, ca.sin(A) + B, ca.fmin(A, B)]
+    names = ["slope", "slope", "step", "exp"]
+    called = [
+        ca.Function(n, [A, B], [e, 2 * e], options) for n, e in zip(names, parts, strict=True)
+    ]
+    values = [value for each in called for value in each(A, B)]
+    function = ca.Function("every_operation", [A, B], [ca.vertcat(*values)])
+    inputs = np.array([(0.3, 1.7), (-2.0, 0.4)])
+    right = [[m * float(ca.Function("e", [A, B], [e])(*ab)) for e in parts for m in (1, 2)]
+             for ab in inputs]  # fmt: skip
+    np.testing.assert_allclose(run(function, inputs), right, rtol=LAST_PLACE)
+
+
+def test_a_stage_too_large_for_the_stack_is_refused_by_name() -> None:
+    many = ca.SX.sym("many", 11_000)
+    function = ca.Function("large", [many], [ca.sum1(many) * many])
+    with pytest.raises(UnsupportedProblem, match="these: the stage is too large"):
+        lane_code([function], "these")
+
+
 def test_an_operation_without_c_is_refused_by_name() -> None:
     function = ca.Function("inverse", [A], [ca.erfinv(A)])
     with pytest.raises(UnsupportedProblem, match="these: the native backend cannot write"):

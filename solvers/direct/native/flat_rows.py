@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.direct.native.native_library import NativeArrays
+from solvers.direct.native.native_arrays import NativeArrays
 from solvers.direct.native.stage_code import StageCode
 
 

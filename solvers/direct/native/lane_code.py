@@ -7,6 +7,8 @@ import casadi as ca
 
 from ocp import UnsupportedProblem
 
+# Variables of one function, each of a lane of 32 bytes: they may all stand on the stack.
+_MOST_VARIABLES = 10_000
 # What C writes as an operator.
 _OPERATORS = {
     ca.OP_ASSIGN: "{0}",
@@ -43,7 +45,8 @@ def lane_code(functions: Iterable[ca.Function], problem: str) -> str:
     """Return the C of some functions of SX, and of those that they call.
 
     Each becomes ``static void name(const V *in, V *out)``, with its arguments one after the other,
-    and its values, column by column.
+    and its values, column by column. What they call is named by a number: its own name may be one
+    that C or the solver knows, or that of another function.
 
     Args:
         functions: dense ones, of different names.
@@ -52,26 +55,55 @@ def lane_code(functions: Iterable[ca.Function], problem: str) -> str:
     Raises:
         UnsupportedProblem: for an operation without C, or a call of what is no function of SX.
     """
-    written: dict[str, str] = {}
+    called: dict[int, str] = {}
+    written: list[str] = []
     for function in functions:
-        _write(function, problem, written)
-    return "\n".join(written.values())
+        _write(function, function.name(), problem, called, written)
+    return "\n".join(written)
 
 
-def _write(function: ca.Function, problem: str, written: dict[str, str]) -> None:
-    """Write a function after those that it calls, each once."""
+def _write(
+    function: ca.Function,
+    name: str,
+    problem: str,
+    called: dict[int, str],
+    written: list[str],
+) -> None:
+    """Write a function after those that it calls, each once.
+
+    ``called`` holds their names in C, by the hash, which is the identity: two Python objects of one
+    Function are not equal.
+    """
     if not function.is_a("SXFunction"):
         raise UnsupportedProblem(
             f"{problem}: the native backend cannot write the call of '{function.name()}' as C; "
             "write it with CasADi's operations, or take backend='ipopt'"
         )
-    called = [function.get_function(name) for name in function.get_function()]
-    for each in called:
-        if each.name() not in written:
-            _write(each, problem, written)
-    head = [f"static void {function.name()}(const V *in, V *out) {{", "(void)in, (void)out;"]
+    if function.sz_w() > _MOST_VARIABLES:
+        raise UnsupportedProblem(
+            f"{problem}: the stage is too large for the native backend, which would keep "
+            f"{function.sz_w()} numbers at once on the stack (at most {_MOST_VARIABLES}); "
+            "take backend='ipopt' or 'fatrop'"
+        )
+    for each in _calls(function).values():
+        if hash(each) not in called:
+            called[hash(each)] = f"called_{len(called)}"
+            _write(each, called[hash(each)], problem, called, written)
+    head = [f"static void {name}(const V *in, V *out) {{", "(void)in, (void)out;"]
     lines = [*head, *_variables(function), *_lines(function, called, problem)]
-    written[function.name()] = "\n  ".join(lines) + "\n}\n"
+    written.append("\n  ".join(lines) + "\n}\n")
+
+
+def _calls(function: ca.Function) -> dict[int, ca.Function]:
+    """Return what is called, by the number of the instruction."""
+    if ca.OP_CALL not in map(function.instruction_id, range(function.n_instructions())):
+        return {}
+    values = function.instructions_sx()
+    return {
+        k: values[k].which_function()
+        for k in range(function.n_instructions())
+        if function.instruction_id(k) == ca.OP_CALL
+    }
 
 
 def _variables(function: ca.Function) -> Iterator[str]:
@@ -88,8 +120,9 @@ def _variables(function: ca.Function) -> Iterator[str]:
         yield f"V {', '.join(f'a{i}' for i in sorted(made))};"
 
 
-def _lines(function: ca.Function, called: list[ca.Function], problem: str) -> Iterator[str]:
+def _lines(function: ca.Function, called: dict[int, str], problem: str) -> Iterator[str]:
     """Yield one statement an instruction."""
+    calls = _calls(function)
     arguments = _begins(function.nnz_in(i) for i in range(function.n_in()))
     values = _begins(function.nnz_out(i) for i in range(function.n_out()))
     for k in range(function.n_instructions()):
@@ -102,7 +135,7 @@ def _lines(function: ca.Function, called: list[ca.Function], problem: str) -> It
         elif operation == ca.OP_CONST:
             yield f"a{made[0]} = ALL({_number(function.instruction_constant(k))});"
         elif operation == ca.OP_CALL:
-            yield _call(_which(called, len(given), len(made)), given, made)
+            yield _call(called[hash(calls[k])], given, made)
         elif operation in _OPERATORS:
             names = [f"a{i}" for i in given]
             yield f"a{made[0]} = {_OPERATORS[operation].format(*names)};"
@@ -118,16 +151,6 @@ def _call(name: str, given: list[int], made: list[int]) -> str:
     # An output that nobody uses has no place.
     kept = " ".join(f"a{i} = y[{j}];" for j, i in enumerate(made) if i >= 0)
     return f"{{ const V x[] = {{{arguments}}}; V y[{len(made)}]; {name}(x, y); {kept} }}"
-
-
-def _which(called: list[ca.Function], given: int, made: int) -> str:
-    """Return the name of the function that takes and returns so many numbers."""
-    fitting = [f.name() for f in called if f.nnz_in() == given and f.nnz_out() == made]
-    if len(fitting) != 1:
-        raise UnsupportedProblem(
-            f"the native backend cannot tell which function is called with {given} numbers"
-        )
-    return fitting[0]
 
 
 def _begins(counts: Iterable[int]) -> list[int]:

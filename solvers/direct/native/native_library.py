@@ -9,46 +9,16 @@ import numpy as np
 
 from ocp import Compiler, UnsupportedProblem
 from ocp.internal import Unbuildable, built_library
+from solvers.direct.native.library_check import first_difference
+from solvers.direct.native.native_arrays import NativeArrays
 from solvers.direct.native.stage_code import StageCode
 
 _LINE = 64  # bytes that memory is aligned to
-# By how much compiled derivatives may differ, relative to 1 + abs(value), and at how many points.
-_SAME, _PROBES = 1e-6, 2
 _REPORT = 12  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
 _NOTED = 512  # iterations of which something is noted
 #: What is noted of an iteration.
 NOTE = ("cost", "primal", "dual", "product", "barrier", "shift", "length")
-
-
-class NativeArrays(NamedTuple):
-    """The memory that Python writes and reads, as views; see ``workspace.h``."""
-
-    x: np.ndarray
-    u: np.ndarray
-    costate: np.ndarray
-    data: np.ndarray
-    low: np.ndarray
-    up: np.ndarray
-    v: np.ndarray
-    z_low: np.ndarray
-    z_up: np.ndarray
-    y: np.ndarray
-    x_given: np.ndarray
-    u_given: np.ndarray
-    has_low: np.ndarray
-    has_up: np.ndarray
-    is_equation: np.ndarray
-    gap: np.ndarray
-    slope: np.ndarray
-    gradient: np.ndarray
-    hessian: np.ndarray
-    c_slope: np.ndarray
-    sigma: np.ndarray
-    rhs: np.ndarray
-    dx: np.ndarray
-    du: np.ndarray
-    dcostate: np.ndarray
 
 
 class NativeReport(NamedTuple):
@@ -114,51 +84,37 @@ class NativeLibrary:
         """Compile and load it, or load it from the cache.
 
         Raises:
-            UnsupportedProblem: where there is no compiler, or it fails.
+            UnsupportedProblem: where there is no compiler, it fails, or what it has made cannot be
+                loaded or gives other numbers than CasADi.
         """
+        name, compiler = code.transcription.ocp.name, compiler or Compiler()
         try:
-            path = built_library(code.code, compiler or Compiler())
+            path = built_library(code.code, compiler)
         except Unbuildable as reason:
+            advice = "" if compiler.found else "install one (gcc or clang), or "
             raise UnsupportedProblem(
-                f"{code.transcription.ocp.name}: the native backend needs a C compiler, and "
-                f"{reason}; install one (gcc or clang), or take backend='ipopt'"
+                f"{name}: the native backend needs a C compiler, and {reason}; "
+                f"{advice}take backend='ipopt'"
             ) from reason
-        library = ctypes.CDLL(str(path))
+        try:
+            library = ctypes.CDLL(str(path))
+        except OSError as reason:
+            raise UnsupportedProblem(
+                f"{name}: the library of the native backend cannot be loaded: {reason}; "
+                "take backend='ipopt'"
+            ) from reason
         library.native_bytes.restype = ctypes.c_size_t
         library.native_evaluate.restype = ctypes.c_double
+        library.native_evaluate.argtypes = [ctypes.c_void_p, ctypes.c_int]
         library.native_linear_step.argtypes = [ctypes.c_void_p, ctypes.c_double]
         loaded = cls(code, library)
-        loaded._compare_with_casadi()
+        if wrong := first_difference(code, loaded.arrays, loaded.evaluate):
+            raise UnsupportedProblem(
+                f"{name}: the compiled stage gives other numbers than CasADi ({wrong}): "
+                "the compiler is at fault; take backend='ipopt'"
+            )
+        loaded._clear()
         return loaded
-
-    def _compare_with_casadi(self) -> None:
-        """Compare the derivatives of the last stage at a few points: compilers make mistakes.
-
-        Raises:
-            UnsupportedProblem: if they differ by more than rounding.
-        """
-        at, rng, code = self.arrays, np.random.default_rng(0), self.code
-        full = next(f for f in code.functions if f.name() == "stage_full")
-        for _ in range(_PROBES):
-            for array in (at.x, at.u, at.data, at.costate, at.y):
-                array[:] = rng.uniform(0.5, 1.5, size=array.shape)
-            self.evaluate()
-            last = code.flat_size - len(code.bounded) - code.row_counts[2]
-            y = at.y[last - code.row_counts[0] : last]
-            known = full.call([at.x[-2], at.u[-1], at.data[-2], at.costate[-1], y])
-            made = {3: at.slope[-1].T, 4: at.gradient[-2], 6: at.hessian[-2].T}
-            if code.transcription.n == 1:  # rows of the start are added there
-                del made[6]
-            for i, found in made.items():
-                right = np.array(known[i]).reshape(found.shape, order="F")
-                is_known = np.isfinite(right)
-                right, found = right[is_known], found[is_known]
-                if not (np.abs(found - right) <= _SAME * (1.0 + np.abs(right))).all():
-                    raise UnsupportedProblem(
-                        f"{code.transcription.ocp.name}: the compiled stage gives other numbers "
-                        "than CasADi: the compiler is at fault; take backend='ipopt'"
-                    )
-        self._clear()
 
     def _clear(self) -> None:
         """Lay the memory out again."""
@@ -200,9 +156,9 @@ class NativeLibrary:
         """Solve the condensed system of what is in the arrays; return whether it is convex."""
         return bool(self.library.native_linear_step(self._block, shift))
 
-    def evaluate(self) -> float:
-        """Evaluate everything at what is in the arrays; return the cost."""
-        return float(self.library.native_evaluate(self._block))
+    def evaluate(self, order: int) -> float:
+        """Evaluate at what is in the arrays, up to derivatives of an order; return the cost."""
+        return float(self.library.native_evaluate(self._block, order))
 
     @cached_property
     def _memory(self) -> np.ndarray:

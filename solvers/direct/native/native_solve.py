@@ -1,6 +1,6 @@
 """``NativeSolve``: the native solver between vectors of unknowns and rows of the program."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from time import perf_counter
@@ -25,6 +25,8 @@ ENDINGS = (
     "time limit",
     "diverged",
 )
+# Work of a run in its statistics, which that of the next one is added to.
+_WORK = ("iter_count", "n_call_nlp_g", "n_call_nlp_jac_g", "factorisations")
 # After these no other way to iterate is tried from the same first iterate.
 _FINAL = ("solved", "iteration limit", "time limit")
 
@@ -84,7 +86,9 @@ class NativeSolve:
         bounds: dict[str, np.ndarray],
         costate: np.ndarray | None,
     ) -> NlpResult:
-        """Run it; return the first iterate where its result is not finite.
+        """Run it, in ways that follow each other; return the best of their results.
+
+        The first iterate comes back where that is not finite.
 
         Args:
             w0: first iterate.
@@ -99,9 +103,10 @@ class NativeSolve:
         has_sides = bool(at.has_low.any() or at.has_up.any())
         skipped = {_Way.WARM: costate is None, _Way.MONOTONE: not has_sides}
         stats: dict[str, Any] = {}
+        best: NlpResult | None = None
         started = perf_counter()
         for way in _Way:
-            if skipped.get(way):
+            if skipped.get(way) or (best and self._is_used_up(stats, perf_counter() - started)):
                 continue
             at.x[:], at.u[:] = tr.split(w0)
             at.costate[:] = 0.0
@@ -110,11 +115,21 @@ class NativeSolve:
             used = stats.get("iter_count", 0), perf_counter() - started
             ending = ENDINGS[library.solve(self.limits.options(way, *used))]
             stats = _stats(ending, library.report(), library.notes(), stats)
+            found = self._result(bounds, stats)
+            if best is None or _remainder(found) < _remainder(best):
+                best = found
             if ending in _FINAL:
                 break
-        if not np.isfinite(stats["report"].cost) or not np.isfinite(at.x).all():
+        assert best is not None  # a cold start is never skipped as the first
+        stats = best.stats | {name: stats[name] for name in _WORK}
+        if not best.is_finite:
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
-        return self._result(bounds, stats)
+        return replace(best, stats=stats)
+
+    def _is_used_up(self, stats: dict[str, Any], seconds: float) -> bool:
+        """Whether neither time nor iterations are left for another way."""
+        is_late = seconds >= self.limits.time_limit
+        return is_late or stats["iter_count"] >= self.limits.max_iterations
 
     def _result(self, bounds: dict[str, np.ndarray], stats: dict[str, Any]) -> NlpResult:
         at, rows, tr = self.library.arrays, self._rows, self.library.code.transcription
@@ -128,6 +143,15 @@ class NativeSolve:
         return FlatRows.of(self.library.code)
 
 
+def _remainder(result: NlpResult) -> float:
+    """Return what a result leaves of the optimality conditions; inf where it is not finite."""
+    report: NativeReport = result.stats["report"]
+    left = np.max([report.primal, report.dual, report.product])
+    if not (result.is_finite and np.isfinite(left)):
+        return np.inf
+    return 0.0 if result.success else float(left)
+
+
 def _stats(
     word: str, report: NativeReport, notes: np.ndarray, before: dict[str, Any]
 ) -> dict[str, Any]:
@@ -136,6 +160,7 @@ def _stats(
         "iter_count": int(report.iterations),
         "n_call_nlp_g": int(report.values + report.evaluations),
         "n_call_nlp_jac_g": int(report.evaluations),
+        "factorisations": int(report.factorisations),
     }
     by_name = dict(zip(NOTE, notes.T.copy(), strict=True))
     named = {"obj": by_name["cost"], "inf_pr": by_name["primal"], "inf_du": by_name["dual"]}

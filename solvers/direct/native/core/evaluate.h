@@ -24,9 +24,9 @@ static int get(const V *out, int at, int lane, double *numbers, int count) {
 static double evaluate_values(Workspace *s, const double *x, const double *u, double *gap,
                               double *v) {
   double cost = 0.0, l;
+  V *in = s->in, *out = s->out;
   s->values++;
   for (int first = 0; first < s->n; first += LANES) {
-    V in[NX + NU + ND], out[NX + 1 + NC];
     for (int lane = 0; lane < LANES; lane++) {
       const int k = first + lane < s->n ? first + lane : s->n - 1;
       int at = put(in, 0, lane, x + (size_t)k * NX, NX);
@@ -45,7 +45,6 @@ static double evaluate_values(Workspace *s, const double *x, const double *u, do
       for (int i = 0; i < NX; i++) ahead[i] -= x[(size_t)(k + 1) * NX + i];
     }
   }
-  V in[NX + ND], out[1 + NE + NI];
   if (NI > 0) {
     for (int i = 0; i < NX; i++) in[i] = ALL(x[i]);
     for (int i = 0; i < ND; i++) in[NX + i] = ALL(s->data[i]);
@@ -69,8 +68,8 @@ static void row_multipliers(const Workspace *s, int first, int count, double *y)
 /* The stages of evaluate_at_iterate(). */
 static void evaluate_stages(Workspace *s, int second) {
   double y[AT_LEAST_1(NC)], l;
+  V *in = s->in, *out = s->out;
   for (int first = 0; first < s->n; first += LANES) {
-    V in[NX + NU + ND + NX + NC], out[NX + 1 + NC + NX * NW + NW + NC * NW + NW * NW];
     for (int lane = 0; lane < LANES; lane++) {
       const int k = first + lane < s->n ? first + lane : s->n - 1;
       row_multipliers(s, rows_begin(k) + NB, NC, y);
@@ -103,8 +102,8 @@ static void evaluate_stages(Workspace *s, int second) {
 
 /* The rows of the start of evaluate_at_iterate(). */
 static void evaluate_start(Workspace *s, int second) {
-  V in[NX + ND + NI], out[NI + NI * NW + NW * NW];
-  double y[AT_LEAST_1(NI)], own[NW * NW];
+  double y[AT_LEAST_1(NI)];
+  V *in = s->in, *out = s->out;
   row_multipliers(s, NB + NC, NI, y);
   for (int i = 0; i < NX; i++) in[i] = ALL(s->x[i]);
   for (int i = 0; i < ND; i++) in[NX + i] = ALL(s->data[i]);
@@ -112,14 +111,13 @@ static void evaluate_start(Workspace *s, int second) {
   start_full(in, out);
   int at = get(out, 0, 0, s->v + NB + NC, NI);
   at = get(out, at, 0, slopes_of_rows(s, 0) + NC * NW, NI * NW);
-  get(out, at, 0, own, NW * NW);
-  for (int i = 0; i < NW * NW && second; i++) s->hessian[i] += own[i];
+  for (int i = 0; i < NW * NW && second; i++) s->hessian[i] += LANE(out[at + i], 0);
 }
 
 /* The last node of evaluate_at_iterate(). */
 static void evaluate_end(Workspace *s) {
-  V in[NX + ND + NE], out[1 + NE + NW + NE * NW + NW * NW];
   double y[AT_LEAST_1(NE)], l;
+  V *in = s->in, *out = s->out;
   const size_t n = (size_t)s->n;
   const int rows = rows_begin(s->n);
   row_multipliers(s, rows + NB, NE, y);
@@ -138,6 +136,7 @@ static void evaluate_end(Workspace *s) {
 
 /* Everything at the iterate and its multipliers, with first or also with second derivatives. */
 static void evaluate_at_iterate(Workspace *s, int second) {
+  s->has_hessian = second;
   s->evaluations++;
   s->cost = 0.0;
   evaluate_stages(s, second);

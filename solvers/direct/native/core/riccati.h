@@ -42,14 +42,14 @@ static void condensed_hessian(const Workspace *s, int k, double shift, double Q[
 /* Factorise what is free of x_0; return whether all pivots are positive. */
 static int factorise_start(Workspace *s) {
   const double(*P)[NX] = (const double(*)[NX])s->P;
+  double(*S)[NX] = (double(*)[NX])s->start_factor;
   double largest = 0.0;
   for (int i = 0; i < NX; i++)
     for (int j = 0; j < NX; j++) {
       const int given = s->x_given[i] != 0.0 || s->x_given[j] != 0.0;
-      s->start_factor[i][j] = given ? (double)(i == j) : P[i][j];
+      S[i][j] = given ? (double)(i == j) : P[i][j];
       if (!given && i == j && P[i][i] > largest) largest = P[i][i];
     }
-  double(*S)[NX] = s->start_factor;
   for (int p = 0; p < NX; p++) {
     const double d = S[p][p];
     if (!(d > (s->x_given[p] != 0.0 ? 0.0 : PIVOT * largest))) return 0;
@@ -64,7 +64,7 @@ static int factorise_start(Workspace *s) {
 
 /* Factorise with a shift of the Hessian; return whether all pivots are positive. */
 static int factorise(Workspace *s, double shift) {
-  double Q[NW][NW], S[NX][NW];
+  double(*Q)[NW] = (double(*)[NW])s->Q, (*S)[NW] = (double(*)[NW])s->S;
   s->factorisations++;
   condensed_hessian(s, s->n, shift, Q);
   double(*P)[NX] = (double(*)[NX])(s->P + (size_t)s->n * NX * NX);
@@ -160,13 +160,14 @@ static void solve_system(Workspace *s, const double *rhs, const double *gap, dou
     for (int p = NU - 1; p >= 0; p--)
       for (int i = p + 1; i < NU; i++) kappa[p] -= L[i * NU + p] * kappa[i];
   }
+  const double(*start)[NX] = (const double(*)[NX])s->start_factor;
   for (int p = 0; p < NX; p++) dx[p] = s->x_given[p] != 0.0 ? 0.0 : -s->p[p];
   for (int p = 0; p < NX; p++)
-    for (int i = p + 1; i < NX; i++) dx[i] -= s->start_factor[p][i] * s->start_pivot[p] * dx[p];
+    for (int i = p + 1; i < NX; i++) dx[i] -= start[p][i] * s->start_pivot[p] * dx[p];
   for (int p = 0; p < NX; p++) dx[p] *= s->start_pivot[p];
   for (int p = NX - 1; p >= 0; p--)
     for (int i = p + 1; i < NX; i++)
-      dx[p] -= s->start_factor[p][i] * s->start_pivot[p] * dx[i];
+      dx[p] -= start[p][i] * s->start_pivot[p] * dx[i];
   for (int k = 0; k <= s->n; k++) {
     const double *now = dx + (size_t)k * NX;
     const double(*P)[NX] = (const double(*)[NX])(s->P + (size_t)k * NX * NX);

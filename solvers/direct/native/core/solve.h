@@ -212,12 +212,13 @@ static int is_far(const Workspace *s) {
 
 /* Note what an iteration begins with, and the step that led there. */
 static void note(Workspace *s) {
-  if (s->iteration >= NOTED) return;
-  s->notes[s->iteration] = (Note){s->cost, s->left.primal, s->left.dual, s->left.product,
-                                  s->mu,   s->shift,       s->length};
+  const int at = s->iteration < NOTED ? s->iteration : NOTED - 1;
+  s->notes[at] = (Note){s->cost, s->left.primal, s->left.dual, s->left.product,
+                        s->mu,   s->shift,       s->length};
 }
 
-/* Iterate until an end or a pause; PAUSED: call it again with begin = 0. */
+/* Iterate until an end or a pause, which is after an iteration, so that each call gets further;
+ * PAUSED: call it again with begin = 0. */
 static Ending iterate(Workspace *s, const Options *o, int begin) {
   const double started = clock_seconds(), before = begin ? 0.0 : s->seconds;
   const double floor = FLOOR * o->tolerance;
@@ -228,12 +229,12 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     s->iteration = s->is_monotone = s->filter_size = 0;
     s->factorisations = s->evaluations = s->values = 0;
     s->length = 1.0;
+    s->best = INFINITY;
+    s->since_best = 0;
     if (o->monotone != 0.0) s->is_monotone = 1;
     if (!warm) memset(s->lambda, 0, sizeof(double) * (size_t)(s->n + 1) * NX);
     start_barrier(s, s->mu, warm);
   }
-  double best = INFINITY;
-  int since_best = 0, second = 1;
   for (;;) {
     weigh(s);
     s->left = residuals(s, 0.0);
@@ -245,16 +246,17 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     if (is_far(s)) return DIVERGED;
     s->seconds = before + clock_seconds() - started;
     if (s->seconds > o->time_limit) return TIME_LIMIT;
-    if (!second) evaluate_at_iterate(s, 1);
-    if (s->seconds - before > o->pause) return PAUSED;
-    since_best = error < 0.9999 * best ? 0 : since_best + 1;
-    best = least(best, error);
-    if (s->sides > 0.0 && !s->is_monotone && since_best >= PATIENCE) become_monotone(s);
+    if (!s->has_hessian) evaluate_at_iterate(s, 1);
+    s->since_best = error < 0.9999 * s->best ? 0 : s->since_best + 1;
+    s->best = least(s->best, error);
+    if (s->sides > 0.0 && !s->is_monotone && s->since_best >= PATIENCE) become_monotone(s);
     if (s->is_monotone) lower_barrier(s, floor);
     if (!step(s, floor)) return NO_STEP;
     s->iteration++;
     /* Where this step was the last one, as Newton's method promises, no more is needed. */
-    second = error > sqrt(o->tolerance) || s->length < 1.0 || s->mu > 10.0 * floor;
-    evaluate_at_iterate(s, second);
+    const int goes_on = error > sqrt(o->tolerance) || s->length < 1.0 || s->mu > 10.0 * floor;
+    evaluate_at_iterate(s, goes_on);
+    s->seconds = before + clock_seconds() - started;
+    if (s->seconds - before >= o->pause) return PAUSED;
   }
 }

@@ -26,10 +26,17 @@
 
 #define AT_LEAST_1(n) ((n) > 0 ? (n) : 1)
 
+/* Numbers that the generated functions take and return, at most. */
+#define MOST_ROWS (NC + NI + NE)
+#define MOST_IN (2 * NX + NU + ND + MOST_ROWS)
+#define MOST_OUT (NX + 1 + MOST_ROWS + (NX + 1 + MOST_ROWS + NW) * NW)
+
 /* Pairs that a filter remembers; beyond, the oldest is forgotten. */
 #define FILTER 64
-/* Iterations of which something is noted. */
+/* Iterations of which something is noted; beyond, the last note is that of the newest. */
+#ifndef NOTED
 #define NOTED 512
+#endif
 
 typedef struct {
   double tolerance;     /* of the optimality conditions */
@@ -106,12 +113,19 @@ typedef struct {
   double *P, *K, *L, *closed; /* [n + 1][NX][NX], [n][NU][NX], [n][NU][NU], [n][NX][NX] */
   double *pivot;              /* [n][NU] */
   double *p, *kappa;          /* [n + 1][NX], [n][NU] */
-  double start_factor[NX][NX], start_pivot[NX];
+  double *start_factor, *start_pivot; /* [NX][NX], [NX] */
+
+  /* Scratch: of factorise(), and what goes into and comes out of the generated functions. */
+  double *Q, *S; /* [NW][NW], [NX][NW] */
+  V *in, *out;
 
   /* Course of the iteration. */
   Residuals left;
   double mu, shift, last_shift, length, largest_theta;
   int iteration, is_monotone, factorisations, evaluations, values;
+  int has_hessian; /* whether it is that of the iterate */
+  double best;     /* the smallest error so far */
+  int since_best;  /* iterations without a smaller one */
   int filter_size;
   double filter_theta[FILTER], filter_phi[FILTER];
   double seconds; /* used so far */
@@ -167,5 +181,11 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->K = take(&at, m * AT_LEAST_1(NU) * NX);
   s->L = take(&at, m * AT_LEAST_1(NU) * AT_LEAST_1(NU));
   s->closed = take(&at, m * NX * NX);
+  s->start_factor = take(&at, NX * NX);
+  s->start_pivot = take(&at, NX);
+  s->Q = take(&at, NW * NW);
+  s->S = take(&at, NX * NW);
+  s->in = (V *)take(&at, LANES * (size_t)MOST_IN);
+  s->out = (V *)take(&at, LANES * (size_t)MOST_OUT);
   return at;
 }
