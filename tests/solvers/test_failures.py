@@ -315,18 +315,7 @@ def test_success_is_silent_too(solver: Solver) -> None:
 
 @pytest.mark.parametrize(
     "solver",
-    [
-        *(MultipleShooting(40, backend=b) for b in ("ipopt", "fatrop")),
-        pytest.param(
-            MultipleShooting(40, backend="native"),
-            marks=pytest.mark.xfail(
-                strict=True,
-                reason="of a state that nothing moves at the start the size is 1e7 too large, and "
-                "the native backend meets its iteration limit there: it says INACCURATE",
-            ),
-        ),
-        Collocation(20),
-    ],
+    [*(MultipleShooting(40, backend=b) for b in ("ipopt", "fatrop", "native")), Collocation(20)],
 )
 def test_a_cost_that_is_tiny_at_the_start_hides_no_way(solver) -> None:
     """Beyond a hill the size of the cost is a million times larger: the end was INFEASIBLE."""
