@@ -17,7 +17,7 @@ export MPLBACKEND ?= Agg
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install bench test lint docs quick constraints clean
+.PHONY: help install bench test lint docs quick nightly constraints clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 14
@@ -43,6 +43,9 @@ lint: $(STAMP) ## ruff, pyright, the dependency law
 
 docs: $(STAMP) ## build the documentation, strictly, into build/docs
 	$(BIN)/sphinx-build -W --keep-going -E -q -b html -d build/doctrees docs build/docs
+
+nightly: $(STAMP) ## what goes over the whole library, of which `test` takes a third
+	$(PYTEST) --nightly -m over_library
 
 quick: $(STAMP) ## the tests that are not slow, without coverage
 	$(PYTEST) -m 'not slow'

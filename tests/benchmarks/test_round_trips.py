@@ -170,6 +170,7 @@ def _guess(plain: Solution, posed: OCP) -> Guess:
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 @pytest.mark.parametrize("how", POSED)
 def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Case) -> None:
@@ -214,6 +215,7 @@ def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
     both = _in_rates(case.build())
@@ -233,6 +235,7 @@ def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_with_a_peak_it_is_the_problem_with_a_constant_above(case: Case) -> None:
     ocp, top = case.build(), ca.SX.sym("top")

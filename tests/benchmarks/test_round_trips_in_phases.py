@@ -42,6 +42,7 @@ def _halves(plain: Solution) -> tuple[Guess, Guess]:
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_in_two_phases_it_has_the_same_answer(case: Case) -> None:
     ocp = case.build()

@@ -229,6 +229,7 @@ LIBRARY = [
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_it_finds_the_optimum_of_ipopt_in_the_library(case) -> None:
     native, ipopt = (solve(case.build(), solver) for solver in (NATIVE, IPOPT))
