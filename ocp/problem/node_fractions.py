@@ -93,8 +93,8 @@ def _with_steps(ocp: OCP, nodes: np.ndarray) -> np.ndarray:
     if apart.any():
         missing = float(_steps(ocp)[apart.argmax()])
         raise ProblemError(
-            f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where there are data "
-            "or a constraint: add it by Grid.with_nodes"
+            f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where there are "
+            "data or a constraint: add it by Grid.with_nodes"
         )
     return nodes
 
