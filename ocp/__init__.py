@@ -41,9 +41,10 @@ from ocp.problem.parameters import Parameter, Signal, Unknown
 from ocp.problem.peak import Peak
 from ocp.problem.rate import Rate
 from ocp.referee.evaluate import Evaluation, costates_along, evaluate
-from ocp.solution.solution import Solution, Work
+from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program, Solver, solve
 from ocp.solution.status import Status
+from ocp.solution.work import Work
 
 __all__ = [
     "MPC",

@@ -17,9 +17,10 @@ from ocp.method.method_solver import MethodSolver
 from ocp.problem.end_of_definition import end_of_definition
 from ocp.problem.run_data import RunData
 from ocp.solution.jumps import jumps_along
-from ocp.solution.solution import ControlKind, Solution, Work
+from ocp.solution.solution import ControlKind, Solution
 from ocp.solution.solver import BuiltProgram, InitialGuess
 from ocp.solution.status import Status
+from ocp.solution.work import Work
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -51,6 +51,8 @@ class AlgebraicSolution:
                 root has to be looked for and there is no guess.
         """
         g, z = model.algebraic, model.z
+        if not model.nz:
+            return cls(model, z)
         if (row := undetermined(g, z)) is not None:
             raise ProblemError(
                 f"model '{model.name}': {_equation(model, row)} cannot determine a variable of its "

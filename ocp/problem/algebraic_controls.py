@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.problem.algebraic import AlgebraicSolution
+from ocp.problem.along_guess import along_guess
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
@@ -89,10 +90,8 @@ class AlgebraicControls:
             x: states, (k, nx); None: the start.
             u: controls, (k, nu).
         """
-        ocp = self.original
-        x = np.tile(ocp.start(), (len(u), 1)) if x is None else x
-        p, t = ocp.parameter_values().at(fractions), fractions[None, :] * ocp.duration
-        root, guess = (np.array(v).T for v in self._values.map(len(u))(x.T, u.T, t, p.T))
+        both = along_guess(self.original, self._values, fractions, x, u)
+        root, guess = np.split(both, 2, axis=1)
         return np.where(np.isfinite(root), root, guess)
 
     @property
@@ -105,7 +104,7 @@ class AlgebraicControls:
         ocp, own = self.original, list(self._linear.columns)
         m, written = ocp.model, self.written.model
         values = [self.written.algebraic_solution.values[own], written.z_start[own]]
-        return ca.Function("variables", [m.x, m.u, m.t, ocp.p], [ca.densify(v) for v in values])
+        return ca.Function("variables", [m.x, m.u, m.t, ocp.p], [ca.densify(ca.vertcat(*values))])
 
     @property
     def _sizes(self) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.checks.expressions import readable
+from ocp.problem.along_guess import along_guess
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.guess import Guess
 from ocp.problem.ocp import OCP
@@ -134,11 +135,7 @@ class Epigraph:
             x: states, (k, nx); None: the start.
             u: controls, (k, nu).
         """
-        ocp = self.original
-        x = np.tile(ocp.start(), (len(u), 1)) if x is None else x
-        p = ocp.parameter_values().at(fractions)
-        values = self._maxima.map(len(u))(x.T, u.T, fractions[None, :] * ocp.duration, p.T)
-        return np.array(values).T
+        return along_guess(self.original, self._maxima, fractions, x, u)
 
     @cached_property
     def _maxima(self) -> ca.Function:

@@ -1,7 +1,7 @@
 """What a solver returns: a trajectory, its costates, and how it was found."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -12,43 +12,26 @@ from scipy.interpolate import PPoly
 
 from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
-from ocp.files.archive import made_of, read_archive, write_archive
+from ocp.files.archive import made_of, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
-from ocp.normal_form.normal_form import normal_form
+from ocp.normal_form.normal_form import NormalForm, normal_form
 from ocp.problem.constraint import Constraint
 from ocp.problem.data_residuals import data_residuals
-from ocp.problem.fingerprint import differing_in, fingerprint_entries
+from ocp.problem.fingerprint import fingerprint_entries
 from ocp.problem.nominal_sizes import Sizes
 from ocp.problem.ocp import OCP
 from ocp.problem.portable import without_caches
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import scaled, sizes_of
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial
+from ocp.solution.solution_file import ARRAYS, content_of, read_fields
 from ocp.solution.status import Status
+from ocp.solution.work import Work
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ControlKind = Literal["held", "linear", "polynomial", "extremal"]
-
-
-@dataclass(frozen=True)
-class Work:
-    """What a method did, free of the machine it ran on.
-
-    Attributes:
-        rollouts: integrations of the whole trajectory (states, or states and costates).
-        jacobians: evaluations of the first derivatives along the whole trajectory.
-        factorisations: linear systems factorised.
-    """
-
-    rollouts: int = 0
-    jacobians: int = 0
-    factorisations: int = 0
-
-    def __add__(self, other: "Work") -> "Work":
-        """Return the work of both."""
-        return Work(*[getattr(self, f.name) + getattr(other, f.name) for f in fields(self)])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,7 +97,7 @@ class Solution:
         if self.control_kind not in get_args(ControlKind):
             known = ", ".join(get_args(ControlKind))
             raise ProblemError(f"solution: control_kind = {self.control_kind!r} is none of {known}")
-        for name in _ARRAYS:
+        for name in ARRAYS:
             check_instance(getattr(self, name), np.ndarray, f"solution: {name}")
         n, m = len(self.t), self.problem.model
         object.__setattr__(self, "breaks", np.asarray(self.breaks, dtype=int))
@@ -195,13 +178,18 @@ class Solution:
         return RunData(self.x0, float(self.t[0]), values)
 
     @property
+    def _form(self) -> NormalForm | None:
+        """The normal form that was solved; None where it is the problem itself."""
+        return None if self.normal is None else normal_form(self.problem)
+
+    @property
     def sensitivity(self) -> dict[str, np.ndarray]:
         """dJ*/dk of every unknown constant: 0 inside its bounds, on a bound what that costs.
 
         Where controls have a ``Rate`` also of their ``"last_input"``, 0 where that is free; with a
         ``Delay`` of what was sent before.
         """
-        form = None if self.normal is None else normal_form(self.problem)
+        form = self._form
         if form is None or self.normal is None:
             return {}
         costate = self.normal.costate[0]
@@ -212,7 +200,7 @@ class Solution:
     @property
     def peaks(self) -> dict[str, float]:
         """The largest values along the way, by name, as the solver has them at its nodes."""
-        form = None if self.normal is None else normal_form(self.problem)
+        form = self._form
         if form is None or self.normal is None:
             return {}
         return {name: float(self.normal.x[0, at][0]) for name, at in form.peaks.items()}
@@ -223,11 +211,10 @@ class Solution:
 
         dJ*/d(upper bound) is minus it.
         """
-        if self.normal is None:
+        form = self._form
+        if form is None or self.normal is None:
             return {}
-        form, costate = normal_form(self.problem), self.normal.costate[-1]
-        if form is None:
-            return {}
+        costate = self.normal.costate[-1]
         found = {name: costate[at] for name, at in form.integrals.items()}
         for c in self.problem.at("instants"):
             found[c.name] = costate[form.waypoints.places[c.name]].reshape(-1, c.size)
@@ -295,7 +282,7 @@ class Solution:
         signals of the problem are smooth between them.
         """
         times = _instants(t, "control")
-        form = normal_form(self.problem) if self.normal is not None else None
+        form = self._form
         if self.control_kind == "extremal" and self.normal is not None and form is not None:
             return form.own_controls(self.normal.state(times), self.normal.control(times))
         if self.control_kind == "held":
@@ -402,23 +389,8 @@ class Solution:
         Raises:
             ProblemError: if it cannot be written; a file that was there is as it was.
         """
-        content = self._content() | fingerprint_entries(self.problem)
+        content = content_of(self) | fingerprint_entries(self.problem)
         return write_archive(path, "solution", content)
-
-    def _content(self) -> dict[str, Any]:
-        """Return what an archive keeps."""
-        content: dict[str, Any] = {name: getattr(self, name) for name in (*_ARRAYS, *_SCALARS)}
-        content |= {
-            f"{group}/{key}": value
-            for group in ("history", "parameters", "unknowns")
-            for key, value in getattr(self, group).items()
-        }
-        content |= {f"work/{f.name}": getattr(self.work, f.name) for f in fields(Work)}
-        content |= {"status": self.status.name, "problem": self.problem.name}
-        content |= {"breaks": self.breaks}
-        if self.normal is not None:
-            content |= {f"normal/{k}": value for k, value in self.normal._content().items()}
-        return content
 
     @classmethod
     def load(cls, path: str | Path, problem: OCP) -> "Solution":
@@ -431,54 +403,15 @@ class Solution:
                 checksum); ``whole_arrays`` reads what is left of it.
         """
         check_instance(problem, OCP, f"the problem that {path} is to be a solution of")
-        needed = {"status", "problem", *_ARRAYS, *_SCALARS}
-        data = read_archive(path, "solution", needed)
-        data.setdefault("breaks", np.empty(0, dtype=int))  # files of before there were any
-        if str(data["problem"]) != problem.name:
-            raise ProblemError(f"{path} solves '{data['problem']}', not '{problem.name}'")
+        fields = read_fields(path, problem)
         with made_of(path, "solution"):
-            other = differing_in(data, problem)
-        if other:
-            raise ProblemError(f"{path} solves another '{problem.name}': {', '.join(other)} differ")
-        with made_of(path, "solution"):
-            return cls._of(data, problem)
+            return cls._of(fields)
 
     @classmethod
-    def _of(cls, data: Mapping[str, np.ndarray], problem: OCP) -> "Solution":
-        """Return the solution of an archive."""
-        names = ("history", "parameters", "unknowns", "work", "probe", "normal")
-        groups: dict[str, dict] = {name: {} for name in names}
-        for name, value in data.items():
-            group, _, key = name.partition("/")
-            if key:
-                groups[group][key] = value
-        if str(data["status"]) not in Status.__members__:
-            raise ProblemError(f"its status is '{data['status']}'")
-        form = normal_form(problem) if groups["normal"] else None
-        return cls(
-            problem=problem,
-            status=Status[str(data["status"])],
-            **{name: data[name] for name in (*_ARRAYS, "breaks")},
-            **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
-            history=groups["history"],
-            parameters=groups["parameters"],
-            unknowns=groups["unknowns"],
-            normal=None if form is None else cls._of(groups["normal"], form.problem),
-            work=Work(**{k: int(v) for k, v in groups["work"].items()}),
-        )
-
-
-_ARRAYS = ("t", "x", "x0", "costate", "u")
-_SCALARS = {
-    "solver": str,
-    "message": str,
-    "control_kind": str,
-    "cost": float,
-    "residual": float,
-    "iterations": int,
-    "build_time": float,
-    "solve_time": float,
-}
+    def _of(cls, fields: Mapping[str, Any]) -> "Solution":
+        """Return the solution with these fields, those of its normal form among them."""
+        normal = None if fields["normal"] is None else cls._of(fields["normal"])
+        return cls(**{**fields, "normal": normal})
 
 
 def _split(
