@@ -28,25 +28,14 @@ from solvers import (
     StagewiseNewton,
     polish,
 )
-
-X = ca.SX.sym("position")
-V = ca.SX.sym("velocity")
-U = ca.SX.sym("force")
-MASS = Model(name="mass", x=ca.vertcat(X, V), u=U, f=ca.vertcat(V, U))
+from tests.ocp.mass import MASS, pushed
+from tests.ocp.mass import POSITION as X
+from tests.ocp.mass import VELOCITY as V
 
 
 def mass(**changes: Any) -> OCP:
     """From position 0, with any velocity, to rest at 1 in 1 s, with little force."""
-    given: dict[str, Any] = {
-        "name": "running jump",
-        "model": MASS,
-        "x0": [0.0, 0.0],
-        "horizon": 1.0,
-        "running_cost": U**2 / 2,
-        "constraints": (Constraint("arrival", MASS.x, [1.0, 0.0], [1.0, 0.0], at="terminal"),),
-        "free_start": ("velocity",),
-    }
-    return OCP(**(given | changes))
+    return pushed(**({"name": "running jump", "free_start": ("velocity",)} | changes))
 
 
 # With a first velocity v0 the best force is u = a + b t; rest at 1 asks for a + b/2 = -v0 and

@@ -35,22 +35,15 @@ from solvers import (
     certify,
     diagnose,
 )
-
-P, V, F = (ca.SX.sym(name) for name in ("position", "velocity", "force"))
-MASS = Model(name="mass", x=ca.vertcat(P, V), u=F, f=ca.vertcat(V, F))
-ARRIVAL = Constraint("arrival", MASS.x, [1, 0], [1, 0], at="terminal")
+from tests.ocp.mass import ARRIVAL, MASS, pushed
+from tests.ocp.mass import FORCE as F
+from tests.ocp.mass import POSITION as P
+from tests.ocp.mass import VELOCITY as V
 
 
 def mass(**changes: Any) -> OCP:
-    given: dict[str, Any] = {
-        "name": "mass",
-        "model": MASS,
-        "x0": [0.0, 0.0],
-        "horizon": 1.0,
-        "constraints": (ARRIVAL,),
-        "peaks": (Peak("effort", ca.fabs(F)),),
-    }
-    return OCP(**(given | changes))
+    effort = {"running_cost": 0.0, "peaks": (Peak("effort", ca.fabs(F)),)}
+    return pushed(**(effort | changes))
 
 
 DIRECT = [MultipleShooting(40), Collocation(10)]

@@ -44,25 +44,18 @@ from solvers import (
     multistart,
     polish,
 )
+from tests.ocp.mass import ARRIVAL, MASS, pushed
+from tests.ocp.mass import FORCE as F
+from tests.ocp.mass import POSITION as P
+from tests.ocp.mass import TIME as T
+from tests.ocp.mass import VELOCITY as V
 
-P, V, F, T = (ca.SX.sym(name) for name in ("position", "velocity", "force", "t"))
-MASS = Model(name="mass", x=ca.vertcat(P, V), u=F, f=ca.vertcat(V, F), t=T)
 STEPS = replace(MASS, name="steps", f=ca.vertcat(P + 0.1 * V, V + 0.1 * F), dt=0.1)
-ARRIVAL = Constraint("arrival", MASS.x, [1, 0], [1, 0], at="terminal")
 
 
 def mass(**changes: Any) -> OCP:
-    given: dict[str, Any] = {
-        "name": "mass",
-        "model": MASS,
-        "x0": [0.0, 0.0],
-        "horizon": 1.0,
-        "running_cost": F**2 / 2,
-        "constraints": (ARRIVAL,),
-        "rates": (Rate(F, -60, 60, weight=0.01),),
-        "last_input": [0.5],
-    }
-    return OCP(**(given | changes))
+    rated = {"rates": (Rate(F, -60, 60, weight=0.01),), "last_input": [0.5]}
+    return pushed(**(rated | changes))
 
 
 def steps(**changes: Any) -> OCP:

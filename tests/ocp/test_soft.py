@@ -31,23 +31,19 @@ from solvers import (
     MultipleShooting,
     polish,
 )
-
-X, V, U = (ca.SX.sym(name) for name in ("position", "velocity", "force"))
-MASS = Model(name="mass", x=ca.vertcat(X, V), u=U, f=ca.vertcat(V, U))
-ARRIVAL = Constraint("arrival", MASS.x, [1, 0], [1, 0], at="terminal")
+from tests.ocp.mass import ARRIVAL, MASS, pushed
+from tests.ocp.mass import FORCE as U
+from tests.ocp.mass import POSITION as X
+from tests.ocp.mass import VELOCITY as V
 
 
 def transfer(soft: Soft | None, **changes: Any) -> OCP:
     """From rest to rest in 1 s, at most 1.2 m/s fast if that is worth it (without: 1.5 m/s)."""
-    given: dict[str, Any] = {
+    given = {
         "name": "transfer",
-        "model": MASS,
-        "x0": [0.0, 0.0],
-        "horizon": 1.0,
-        "running_cost": U**2 / 2,
         "constraints": (ARRIVAL, Constraint("slow", V, -3, 1.2, soft=soft)),
     }
-    return OCP(**(given | changes))
+    return pushed(**(given | changes))
 
 
 # The hard limit in closed form: parabolic ramps of a seconds, 4 a h/3 + (1 - 2 a) h = 1 with
