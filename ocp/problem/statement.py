@@ -134,13 +134,9 @@ class Statement(Portable):
         """Whether the final time is an unknown."""
         return isinstance(self.horizon, FreeTime)
 
-    @property
+    @cached_property
     def start_is_free(self) -> np.ndarray:
         """Which states start where the optimiser chooses, bool (nx,)."""
-        return self._start_is_free
-
-    @cached_property
-    def _start_is_free(self) -> np.ndarray:
         if self.free_start:
             return np.array([name in self.free_start for name in self.model.x_names], dtype=bool)
         on_manifold = any(c.at == "initial" for c in self.constraints)

@@ -42,12 +42,18 @@ def peaks(solution: Solution, truth: ReferenceTrajectory) -> np.ndarray:
     ocp = solution.problem
     if not ocp.peaks:
         return np.empty(0)
-    values = np.vstack(_along_steps(ocp, ocp.functions.peaks, stacked(ocp.explicit.peaks), truth))
-    return largest(ocp.peaks, values)
+    values = _along_steps(ocp, ocp.functions.peaks, _peaks_on_control(ocp), truth)
+    return largest(ocp.peaks, np.vstack(values))
+
+
+@once_per_problem
+def _peaks_on_control(ocp: OCP) -> np.ndarray:
+    """Return which rows of the peaks contain a control, bool (m,)."""
+    return depends_on(stacked(ocp.explicit.peaks), ocp.model.u)
 
 
 def _along_steps(
-    ocp: OCP, function: ca.Function, expression: ca.SX, truth: ReferenceTrajectory
+    ocp: OCP, function: ca.Function, on_control: np.ndarray, truth: ReferenceTrajectory
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return rows (K, m) at the starts of the steps and at their ends.
 
@@ -56,7 +62,6 @@ def _along_steps(
     """
     at_start, at_end = _on_steps(function, truth, truth.x[1:])
     if ocp.model.is_discrete:
-        on_control = depends_on(expression, ocp.model.u)
         at_end[:, on_control] = at_start[:, on_control]
     return at_start, at_end
 
@@ -78,8 +83,8 @@ def path_values(
     ocp = solution.problem
     if not ocp.at("path"):
         return
-    expression = ocp.rows.path.expression
-    at_start, at_end = _along_steps(ocp, ocp.functions.path, expression, truth)
+    on_control = ocp.rows.path.on_control
+    at_start, at_end = _along_steps(ocp, ocp.functions.path, on_control, truth)
     yield at_start, truth.t[:-1]
     yield at_end, truth.t[1:]
 
