@@ -15,6 +15,7 @@ import numpy as np
 from ocp.checks.arguments import check_flag, check_instance
 from ocp.checks.errors import ProblemError, UnsupportedProblem
 from ocp.estimation.sensitivities import Estimated, residual_slopes
+from ocp.referee.delayed_controls import with_acting_controls
 from ocp.solution.solution import Solution
 
 # Singular values of the scaled derivatives below this share of the largest are rounding.
@@ -85,8 +86,9 @@ def estimate(solution: Solution, *, sigma_is_known: bool = True) -> Estimate:
     check_instance(solution, Solution, "estimate: solution")
     check_flag(sigma_is_known, "estimate: sigma_is_known")
     _check(solution)
-    estimated = Estimated.of(solution)
-    residuals, slopes = residual_slopes(solution, estimated)
+    acting = with_acting_controls(solution)
+    estimated = Estimated.of(acting)
+    residuals, slopes = residual_slopes(acting, estimated)
     free = np.flatnonzero(~estimated.is_held)
     freedom, name = len(residuals) - len(free), solution.problem.name
     if freedom < 0 or not (sigma_is_known or freedom):

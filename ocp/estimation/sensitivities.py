@@ -18,11 +18,12 @@ from ocp.checks.expressions import element_names
 from ocp.integration.one_step import RK4, Stage
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import Unknown
+from ocp.problem.scaled import sizes_of
 from ocp.referee.evaluate import evaluate
 from ocp.referee.reference_trajectory import ReferenceTrajectory
 from ocp.solution.solution import Solution
 
-# A constant this near to its bound, relative to 1 + abs(bound), is held by it.
+# A constant this near to its bound, relative to its size, is held by it.
 _HELD = 1e-6
 
 
@@ -63,7 +64,9 @@ class Estimated:
             np.concatenate([*[np.ravel(b) for b in each[:-1]], np.asarray(each[-1])[starts]])
             for each in ([b.lower for b in boxes], [b.upper for b in boxes])
         )
-        is_held = _near(values, lower) | _near(values, upper)
+        sizes = np.concatenate([*[e.size for e in ocp.unknowns], sizes_of(ocp).x[starts]])
+        near = _HELD * np.maximum(np.abs(values), sizes)
+        is_held = (values - lower <= near) | (upper - values <= near)
         return cls(tuple(names), values, is_held, in_p, starts)
 
 
@@ -130,8 +133,3 @@ def _readings(ocp: OCP, estimated: Estimated) -> ca.Function:
     in_theta = ca.horzcat(in_theta, ca.SX(h.numel(), len(estimated.starts)))
     outputs = [ca.densify(each) for each in (h, ca.jacobian(h, m.x), in_theta)]
     return ca.Function("readings", [m.x, m.t, p], outputs)
-
-
-def _near(values: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    finite = np.where(np.isfinite(bound), bound, np.inf)
-    return np.abs(values - finite) <= _HELD * (1.0 + np.abs(values))

@@ -12,7 +12,6 @@ import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
 from ocp.problem.constraint import Constraint
-from ocp.problem.parameters import Unknown
 from ocp.problem.scaled import sizes_of
 
 
@@ -21,7 +20,7 @@ def add_unknowns(draft: Draft) -> dict[str, slice]:
     ocp = draft.ocp
     return {
         entry.name: draft.add_states(
-            AddedStates.constant(ocp, entry.symbol, entry.value, size=_size(entry), box=entry.box)
+            AddedStates.constant(ocp, entry.symbol, entry.value, size=entry.size, box=entry.box)
         )
         for entry in ocp.unknowns
     }
@@ -42,11 +41,3 @@ def add_start(draft: Draft, used: Sequence[int]) -> slice:
     draft.constraints.append(Constraint(name, symbol - m.x[index], zero, zero, at="initial"))
     size = sizes_of(ocp).x[index]
     return draft.add_states(AddedStates.constant(ocp, symbol, ocp.start()[index], size=size))
-
-
-def _size(entry: Unknown) -> np.ndarray:
-    """Return typical sizes of an unknown constant: of its guess, or of its bounds."""
-    known = np.abs([entry.value, np.asarray(entry.lower), np.asarray(entry.upper)])
-    guess, bounds = known[0], np.where(np.isfinite(known[1:]), known[1:], 0.0).max(axis=0)
-    size = np.where(guess > 0.0, guess, bounds)
-    return np.where(size > 0.0, size, 1.0)

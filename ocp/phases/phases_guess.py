@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ocp.checks.errors import ProblemError
 from ocp.method.in_normal_form import InNormalForm
@@ -46,14 +47,16 @@ def guess_of_all(
         given: of the caller; without one the phases' own guesses.
         data: what a run gives each phase.
     """
+    shared: dict[str, ArrayLike] = {}
     if isinstance(given, PhasesSolution):
         if given.whole.problem.model.x_names == side.problem.model.x_names:
             return given.whole
+        shared = _shared(side.chain, given)
         given = checked_guess(side.chain, given.phases)
         assert not isinstance(given, PhasesSolution)
     each = given or (None,) * len(side.lanes)
     guesses = [lane.phase.first_guess(guess) for lane, guess in zip(side.lanes, each, strict=True)]
-    if all(guess is None for guess in guesses):
+    if not shared and all(guess is None for guess in guesses):
         return None
     durations = {
         lane.named("duration"): (guess.duration if guess else None) or lane.phase.duration
@@ -65,8 +68,18 @@ def guess_of_all(
         x=_joined([s.x for s in sampled], [s.start for s in sampled]),
         u=_joined([s.u for s in sampled], [s.rest for s in sampled]),
         costate=_joined([s.costate for s in sampled], [0.0 * s.start for s in sampled]),
-        unknowns=durations,
+        unknowns={**shared, **durations},
     )
+
+
+def _shared(chain: Chain, given: PhasesSolution) -> dict[str, ArrayLike]:
+    """Return the values of unknown constants of all phases that another solution knows."""
+    known = {u: given.unknowns[u.name] for u in chain.unknowns if u.name in given.unknowns}
+    return {
+        u.name: np.clip(value, u.box.lower, u.box.upper)
+        for u, value in known.items()
+        if value.size == u.symbol.numel()
+    }
 
 
 class _Sampled(NamedTuple):

@@ -106,6 +106,14 @@ class Unknown(_Constant):
         return np.asarray(self.guess)
 
     @property
+    def size(self) -> np.ndarray:
+        """Typical sizes (m,): of its guess, or of its bounds."""
+        known = np.abs([self.value, np.asarray(self.lower), np.asarray(self.upper)])
+        guess, bounds = known[0], np.where(np.isfinite(known[1:]), known[1:], 0.0).max(axis=0)
+        size = np.where(guess > 0.0, guess, bounds)
+        return np.where(size > 0.0, size, 1.0)
+
+    @property
     def box(self) -> Box:
         """Its bounds, each (m,)."""
         return Box(self.lower, self.upper)

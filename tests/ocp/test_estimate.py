@@ -8,6 +8,7 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Delay,
     Measurement,
     Model,
     ProblemError,
@@ -150,6 +151,34 @@ def test_controls_and_signals_are_given():
     result = estimate(solve(ocp, MultipleShooting(20)).or_raise())
     matrix = design()[0]
     np.testing.assert_allclose(result.covariance, np.linalg.inv(matrix.T @ matrix), rtol=1e-8)
+
+
+def test_a_delayed_control_is_what_acts():
+    push = ca.SX.sym("u")
+    ocp = line(
+        model=Model(name="steps", x=X, u=push, f=X + K * push, dt=1.0),
+        horizon=5,
+        free_start=(),
+        control_bounds=Box(1.0, 1.0),
+        delays=(Delay(push, 1, history=3.0),),
+        data=(Measurement("place", X, np.arange(1.0, 6.0), 2.0 * np.arange(3.0, 8.0), 0.1),),
+    )
+    result = estimate(solve(ocp, MultipleShooting(5)).or_raise())
+    assert result.values == pytest.approx([2.0], rel=1e-8)
+    slopes = np.arange(3.0, 8.0) / 0.1  # 3 acts in the first step, 1 in each of the others
+    assert result.covariance[0, 0] == pytest.approx(1.0 / (slopes @ slopes), rel=1e-8)
+
+
+def test_a_tiny_constant_is_not_held_by_zero():
+    tiny = 1e-9
+    ocp = line(
+        model=Model(name="slow", x=X, u=NONE, f=K / tiny),
+        unknowns=(Unknown("slope", K, tiny, lower=0.0),),
+    )
+    result = estimate(solve(ocp, Collocation(8)).or_raise())
+    assert result.held == ()
+    matrix = design()[0] * [1.0 / tiny, 1.0]
+    np.testing.assert_allclose(result.covariance, np.linalg.inv(matrix.T @ matrix), rtol=1e-6)
 
 
 # -- what is refused ----------------------------------------------------------------------------

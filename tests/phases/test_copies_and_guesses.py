@@ -16,15 +16,22 @@ from ocp import (
     Constraint,
     FreeTime,
     Guess,
+    Link,
+    Model,
+    Parameter,
     Phases,
     PhasesSolution,
     ProblemError,
     Status,
+    Unknown,
     evaluate,
     solve,
 )
+from ocp.phases.phases_guess import guess_of_all
+from ocp.phases.side_by_side import side_by_side
+from ocp.problem.run_data import RunData
 from solvers import Collocation, IndirectShooting, MultipleShooting, certify, multistart, polish
-from tests.phases.problems import BALL, FALL, RISE, U, V, hop, phase
+from tests.phases.problems import BALL, BOUNCE, FALL, GRAVITY, RISE, H, T, U, V, hop, phase
 
 FOUND = solve(hop(), Collocation(6)).or_raise()
 
@@ -91,6 +98,36 @@ def test_each_phase_may_have_a_guess_of_its_own():
     guessed = replace(FALL, guess=given[0])
     own = MultipleShooting(10, max_iterations=1).build(hop(phases=(guessed, RISE))).run()
     assert own.durations == pytest.approx(program.run(guess=given).durations)
+
+
+def test_what_phases_share_is_handed_on_to_another_chain():
+    drag, place = ca.SX.sym("drag"), ca.SX.sym("place")
+    shared = Unknown("drag", drag, 0.1, 0.0, 2.0)
+
+    def chain(height: ca.SX, *more: Constraint) -> Phases:
+        x = ca.vertcat(height, V)
+        model = Model(name="ball", x=x, u=U, f=ca.vertcat(V, U - GRAVITY - drag * V), t=T)
+        fall, rise = (
+            replace(p, model=model, parameters=(Parameter("drag", drag, 0.1),), constraints=rows)
+            for p, rows in (
+                (FALL, (Constraint("ground", height, 0, 0, at="terminal"),)),
+                (RISE, (Constraint("top", x, [1, 0], [1, 0], at="terminal"), *more)),
+            )
+        )
+        link = Link(ca.vertcat(height, -BOUNCE * V))
+        return hop(phases=(fall, rise), links=(link,), unknowns=(shared,))
+
+    tied = Constraint("known", drag, 1.0, 1.0, at="terminal")
+    found = solve(chain(H, tied), MultipleShooting(6)).or_raise()
+    assert found.unknowns["drag"] == pytest.approx([1.0])
+    side = side_by_side(chain(place))
+    data = [RunData.of(p, None, 0.0, {}) for p in side.chain.phases]
+    guess = guess_of_all(side, found, data)
+    assert isinstance(guess, Guess)
+    assert guess.unknowns["drag"] == pytest.approx([1.0])
+    again = MultipleShooting(6).build(side.chain).run(guess=found)
+    assert again.status.is_success
+    assert again.cost <= found.cost
 
 
 def test_many_starts_find_the_same_hop():
