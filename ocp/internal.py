@@ -15,6 +15,7 @@ from ocp.checks.interrupts import interruptible
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
+from ocp.expressions.foreign_functions import external
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
 from ocp.files.draft import replacing, write_file
@@ -129,6 +130,7 @@ __all__ = [
     "elastic",
     "elevated",
     "epigraph",
+    "external",
     "hamiltonian",
     "interpolate",
     "interruptible",

@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ocp import RK4, Compiler, UnsupportedProblem
+from ocp import RK4, Compiler, Table, UnsupportedProblem
+from ocp.expressions.equations import solve_equations
 from ocp.internal import Transcription, built_library
 from solvers.direct.native.lane_code import lane_code
 from solvers.direct.native.stage_code import StageCode, read
@@ -99,12 +100,41 @@ def test_an_operation_without_c_is_refused_by_name() -> None:
         lane_code([function], "these")
 
 
-def test_a_call_of_an_opaque_function_is_refused_by_name() -> None:
+def test_functions_that_branch_are_called_a_lane_at_a_time() -> None:
+    """A table and a root, with their derivatives; the root is no number where there is none."""
+    table = Table(np.linspace(-3.0, 3.0, 9), np.cos(np.linspace(-3.0, 3.0, 9)), beyond="extend")
+    root = ca.SX.sym("root")
+    solved = solve_equations(ca.exp(root) + root - A * B, root, ca.SX(1.0)).values
+    none = solve_equations(root**2 + 1.0 + A**2, root, ca.SX(1.0)).values
+    values = ca.vertcat(table(A), solved)
+    _, gradient = ca.hessian(ca.sum1(values), ca.vertcat(A, B))
+    slopes = ca.vertcat(ca.jacobian(gradient, A), gradient)
+    function = ca.Function(
+        "every_operation", [A, B], [ca.densify(ca.vertcat(values, none, slopes))]
+    )
+    inputs = np.random.default_rng(0).uniform(0.2, 4.0, size=(9, 2))
+    right = np.array([np.array(function(a, b)).ravel() for a, b in inputs])
+    found = run(function, inputs)
+    assert np.isnan(found[:, 2]).all()
+    np.testing.assert_allclose(found, right, rtol=1e-9, atol=1e-12)
+
+
+class _Python(ca.Callback):
+    """A function whose code is in Python."""
+
+    def __init__(self) -> None:
+        ca.Callback.__init__(self)
+        self.construct("opaque", {"enable_fd": True})
+
+
+def test_a_function_of_python_is_refused_by_name() -> None:
+    opaque = _Python()
     x = ca.MX.sym("x")
-    opaque = ca.Function("opaque", [x], [ca.sin(x) * x], {"never_inline": True})
-    function = ca.Function("outer", [A], [opaque(A)])
-    with pytest.raises(UnsupportedProblem, match="'opaque'"):
-        lane_code([function], "these")
+    inside = ca.Function("inside", [x], [2.0 * opaque(x)], {"never_inline": True})
+    for called in (opaque, inside):
+        function = ca.Function("outer", [A], [called(A)])
+        with pytest.raises(UnsupportedProblem, match=r"these: .* no C of 'opaque'"):
+            lane_code([function], "these")
 
 
 @pytest.mark.parametrize("make", [swing, free_time, unbounded])

@@ -12,6 +12,7 @@ from models import cart_pole_upright
 from ocp import (
     MPC,
     OCP,
+    Constraint,
     Guess,
     InputSource,
     Model,
@@ -156,15 +157,42 @@ def test_blocks_are_refused_by_name() -> None:
 
 def test_what_cannot_be_written_as_c_is_refused_by_name() -> None:
     x, u = ca.SX.sym("x"), ca.SX.sym("u")
-    places = np.linspace(-5.0, 5.0, 12)
-    drag = Table(places, 0.1 * places**2, beyond="extend", name="drag")
-    for force in (drag(x), ca.erfinv(0.1 * x)):
-        model = Model(name="mass", x=x, u=u, f=u - force)
-        ocp = OCP(name="drawn", model=model, x0=[1.0], horizon=1.0, running_cost=u**2)
-        with pytest.raises(UnsupportedProblem, match="drawn: the native backend cannot write"):
-            NATIVE.build(ocp)
+    model = Model(name="mass", x=x, u=u, f=u - ca.erfinv(0.1 * x))
+    ocp = OCP(name="drawn", model=model, x0=[1.0], horizon=1.0, running_cost=u**2)
+    with pytest.raises(UnsupportedProblem, match="drawn: the native backend cannot write"):
+        NATIVE.build(ocp)
     with pytest.raises(UnsupportedProblem, match="explicit integrators, not Radau"):
         replace(NATIVE, integrator=Radau()).build(swing())
+
+
+def called() -> OCP:
+    """A mass in drag that is a table, whose cost is a root."""
+    x, u, z = (ca.SX.sym(name) for name in ("x", "u", "z"))
+    places = np.linspace(-5.0, 5.0, 12)
+    drag = Table(places, 0.1 * places**2, beyond="extend", name="drag")
+    model = Model(
+        name="mass", x=x, u=u, z=z, f=u - drag(x), algebraic=ca.exp(z) + z - x - 2.0, z_guess=1.0
+    )
+    return OCP(
+        name="called",
+        model=model,
+        x0=[1.0],
+        horizon=1.0,
+        running_cost=u**2 + z**2,
+        constraints=(Constraint("there", x, 0.2, 0.2, at="terminal"),),
+        smoothness=1,
+    )
+
+
+def test_tables_and_roots_are_called() -> None:
+    ocp = called()
+    found, right = (
+        solve(ocp, solver).or_raise() for solver in (NATIVE, replace(NATIVE, backend="ipopt"))
+    )
+    assert found.cost == pytest.approx(right.cost, rel=1e-8)
+    np.testing.assert_allclose(found.u, right.u, atol=1e-6)
+    np.testing.assert_allclose(found.costate, right.costate, atol=1e-6)
+    assert "IPOPT" not in found.message
 
 
 def test_a_start_that_is_data_is_refused_by_name() -> None:

@@ -1,11 +1,13 @@
 """CasADi Functions as C on lanes: straight-line code, one assignment an operation."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from itertools import accumulate
 
 import casadi as ca
 
 from ocp import UnsupportedProblem
+from solvers.direct.native.foreign_code import foreign_code
 
 # Variables of one function, each of a lane of 32 bytes: they may all stand on the stack.
 _MOST_VARIABLES = 10_000
@@ -53,45 +55,49 @@ def lane_code(functions: Iterable[ca.Function], problem: str) -> str:
         problem: whose they are, for messages.
 
     Raises:
-        UnsupportedProblem: for an operation without C, or a call of what is no function of SX.
+        UnsupportedProblem: for an operation without C, or a call of what has none.
     """
-    called: dict[int, str] = {}
-    written: list[str] = []
+    code = _LaneCode(problem)
     for function in functions:
-        _write(function, function.name(), problem, called, written)
-    return "\n".join(written)
+        code.write(function, function.name())
+    return "\n".join([foreign_code(code.foreign, problem), *code.written])
 
 
-def _write(
-    function: ca.Function,
-    name: str,
-    problem: str,
-    called: dict[int, str],
-    written: list[str],
-) -> None:
-    """Write a function after those that it calls, each once.
+@dataclass(frozen=True, eq=False)
+class _LaneCode:
+    """What is written so far.
 
-    ``called`` holds their names in C, by the hash, which is the identity: two Python objects of one
-    Function are not equal.
+    Attributes:
+        problem: whose functions they are, for messages.
+        called: names in C of what is called, by the hash, which is the identity: two Python objects
+            of one Function are not equal.
+        foreign: functions that are no SX, by their names in C.
+        written: the C of the others, each after those that it calls.
     """
-    if not function.is_a("SXFunction"):
-        raise UnsupportedProblem(
-            f"{problem}: the native backend cannot write the call of '{function.name()}' as C; "
-            "write it with CasADi's operations, or take backend='ipopt'"
-        )
-    if function.sz_w() > _MOST_VARIABLES:
-        raise UnsupportedProblem(
-            f"{problem}: the stage is too large for the native backend, which would keep "
-            f"{function.sz_w()} numbers at once on the stack (at most {_MOST_VARIABLES}); "
-            "take backend='ipopt' or 'fatrop'"
-        )
-    for each in _calls(function).values():
-        if hash(each) not in called:
-            called[hash(each)] = f"called_{len(called)}"
-            _write(each, called[hash(each)], problem, called, written)
-    head = [f"static void {name}(const V *in, V *out) {{", "(void)in, (void)out;"]
-    lines = [*head, *_variables(function), *_lines(function, called, problem)]
-    written.append("\n  ".join(lines) + "\n}\n")
+
+    problem: str
+    called: dict[int, str] = field(default_factory=dict)
+    foreign: dict[str, ca.Function] = field(default_factory=dict)
+    written: list[str] = field(default_factory=list)
+
+    def write(self, function: ca.Function, name: str) -> None:
+        """Write a function after those that it calls, each once."""
+        if not function.is_a("SXFunction"):
+            self.foreign[name] = function
+            return
+        if function.sz_w() > _MOST_VARIABLES:
+            raise UnsupportedProblem(
+                f"{self.problem}: the stage is too large for the native backend, which would keep "
+                f"{function.sz_w()} numbers at once on the stack (at most {_MOST_VARIABLES}); "
+                "take backend='ipopt' or 'fatrop'"
+            )
+        for each in _calls(function).values():
+            if hash(each) not in self.called:
+                self.called[hash(each)] = f"called_{len(self.called)}"
+                self.write(each, self.called[hash(each)])
+        head = [f"static void {name}(const V *in, V *out) {{", "(void)in, (void)out;"]
+        lines = [*head, *_variables(function), *_lines(function, self.called, self.problem)]
+        self.written.append("\n  ".join(lines) + "\n}\n")
 
 
 def _calls(function: ca.Function) -> dict[int, ca.Function]:
