@@ -11,7 +11,7 @@ from benchmarks.__main__ import _parser
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("ocp", "models", "solvers", "benchmarks")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 # What a command writes, and is not there before.
 WRITTEN = ("results/",)
 FILE = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")

@@ -8,6 +8,7 @@ from benchmarks.commands.figures import FIGURES_COMMAND
 from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, FOLLOWED, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
+from benchmarks.commands.pages import PAGES
 from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
@@ -32,6 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     FOLLOWED,
     MISTAKES_COMMAND,
     PEERS_COMMAND,
+    PAGES,
     ROOMS,
 )
 

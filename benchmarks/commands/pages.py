@@ -1,0 +1,50 @@
+"""``pages``: run the code of the documentation's pages, and renew the pictures that they show."""
+
+import os
+import shutil
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rich.console import Console
+from rich.progress import track
+
+from benchmarks.commands.command import Command
+from benchmarks.commands.options import named
+from benchmarks.pages.page import DOCS, Page, difference, pages
+
+_SHOWN = DOCS / "_static" / "pages"
+
+
+def _options(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="learn/1-first-problem, learn, ..."
+    )
+
+
+def _run(options: Namespace, console: Console) -> int:
+    chosen = named(pages(), options.names, "page", by_beginning=True)
+    wrong = 0
+    for page in track(chosen, "pages", console=console):
+        for said in _renewed(page):
+            console.print(f"{page.name}: {said}", markup=False)
+            wrong += 1
+    console.print(f"{len(chosen)} pages, {wrong} differences; pictures are in {_SHOWN}")
+    return int(wrong > 0)
+
+
+def _renewed(page: Page) -> list[str]:
+    """Run a page, keep the pictures that it shows, and return what differs from what it says."""
+    found, before = [], Path.cwd()
+    with TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            found = [difference(step.said, text) for step, text in page.run() if step.said]
+            for picture in page.pictures:
+                shutil.copy(picture, _SHOWN / picture)
+        finally:
+            os.chdir(before)
+    return [said for said in found if said]
+
+
+PAGES = Command("pages", "run the code of the pages, renew their pictures", _options, _run)
