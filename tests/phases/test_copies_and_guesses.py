@@ -120,12 +120,13 @@ def test_what_phases_share_is_handed_on_to_another_chain():
     tied = Constraint("known", drag, 1.0, 1.0, at="terminal")
     found = solve(chain(H, tied), MultipleShooting(6)).or_raise()
     assert found.unknowns["drag"] == pytest.approx([1.0])
-    side = side_by_side(chain(place))
-    data = [RunData.of(p, None, 0.0, {}) for p in side.chain.phases]
+    other = chain(place)
+    side = side_by_side(other)
+    data = [RunData.of(p, None, 0.0, {}) for p in other.phases]
     guess = guess_of_all(side, found, data)
     assert isinstance(guess, Guess)
     assert guess.unknowns["drag"] == pytest.approx([1.0])
-    again = MultipleShooting(6).build(side.chain).run(guess=found)
+    again = MultipleShooting(6).build(other).run(guess=found)
     assert again.status.is_success
     assert again.cost <= found.cost
 
