@@ -69,6 +69,7 @@ from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.shifted_plan import ShiftedPlan
 from ocp.solution.solver import BuiltProgram
 
 __all__ = [
@@ -100,6 +101,7 @@ __all__ = [
     "RunResult",
     "ScaledOCP",
     "ScalingSolver",
+    "ShiftedPlan",
     "Sizes",
     "Stage",
     "StageInputs",

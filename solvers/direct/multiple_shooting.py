@@ -23,11 +23,13 @@ from ocp.internal import (
     refuse_compiled,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
-from solvers.direct.nlp_backends import Nlp, NlpBackend
+from solvers.direct.native.warm_run import WarmRun
+from solvers.direct.nlp_backends import NativeNlp, Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
 from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
+from solvers.direct.warm_start import WarmStart
 from solvers.direct.weak_method import weak_method
 
 
@@ -160,6 +162,9 @@ class MultipleShootingProgram(MethodProgram):
 
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
         """Solve for these data, in the phases of ``NlpRun``."""
+        warm = self._warm_run(data, guess) if self._warm_run and guess else None
+        if isinstance(warm, RunResult):
+            return warm
         ocp, duration = self.ocp, first_duration(self.ocp, guess)
 
         def first(duration: float, source: FirstStates) -> np.ndarray:
@@ -167,7 +172,7 @@ class MultipleShootingProgram(MethodProgram):
 
         others = partial(other_starts, ocp, guess, duration, first)
         w0 = first(duration, "tame")
-        outcome = self._nlp_run.solve(w0, data, others, self._costate(guess))
+        outcome = self._nlp_run.solve(w0, data, others, warm or self._warm_start(guess))
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
             outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
             return self._result(data, outcome, self._without_slope)
@@ -213,13 +218,23 @@ class MultipleShootingProgram(MethodProgram):
         u = u if blocks is None else blocks.holding(u)
         return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
 
-    def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
-        """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""
+    def _warm_start(self, guess: InitialGuess | None) -> WarmStart | None:
+        """Return the costates of a guess with states, for a backend that uses them."""
         nx, start = self.ocp.model.nx, np.zeros(1)
         if self.solver.backend != "native" or guess is None:
             return None
         costate = guess.sample("costate", self.grid.fractions, nx)
-        return None if costate is None or guess.sample("x", start, nx) is None else costate
+        if costate is None or guess.sample("x", start, nx) is None:
+            return None
+        return WarmStart(costate)
+
+    @cached_property
+    def _warm_run(self) -> WarmRun | None:
+        """Runs from an earlier plan, for the native backend; None: all are ``NlpRun``'s."""
+        is_given = not (self.ocp.has_free_start or self.ocp.has_free_time)
+        if not (isinstance(self.nlp, NativeNlp) and is_given):
+            return None
+        return WarmRun(self.nlp.run, self.solver.accuracy)
 
     # -- the result ---------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ _MAIN = """
 #include <stdlib.h>
 int main(void) {
   char *block = aligned_alloc(64, (native_bytes(INTERVALS) + 63) / 64 * 64);
-  double *arrays[25];
+  double *arrays[31];
   native_set_up(block, INTERVALS);
   native_arrays(block, arrays);
   memcpy(arrays[0], x, sizeof x);

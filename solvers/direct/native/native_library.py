@@ -53,6 +53,25 @@ class NativeReport(NamedTuple):
     barrier: float
 
 
+class NativeAccount(ctypes.Structure):
+    """``Account`` of ``account.h``: what an answer is worth, beside its optimality.
+
+    Attributes:
+        moved: by how much half the integration step moves a state, relative to size + abs(x).
+        node: where.
+        unmoved: number of controls that are those of the first iterate all along.
+    """
+
+    moved: float
+    node: float
+    unmoved: float
+    _fields_ = (
+        ("moved", ctypes.c_double),
+        ("node", ctypes.c_double),
+        ("unmoved", ctypes.c_double),
+    )
+
+
 class NativeOptions(ctypes.Structure):
     """``Options`` of ``workspace.h``."""
 
@@ -107,8 +126,9 @@ class NativeLibrary:
         library.native_evaluate.restype = ctypes.c_double
         library.native_evaluate.argtypes = [ctypes.c_void_p, ctypes.c_int]
         library.native_linear_step.argtypes = [ctypes.c_void_p, ctypes.c_double]
+        library.native_shift.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
         loaded = cls(code, library)
-        if wrong := first_difference(code, loaded.arrays, loaded.evaluate):
+        if wrong := first_difference(code, loaded.arrays, loaded.evaluate, loaded.account):
             raise UnsupportedProblem(
                 f"{name}: the compiled stage gives other numbers than CasADi ({wrong}): "
                 "the compiler is at fault; take backend='ipopt'"
@@ -119,6 +139,21 @@ class NativeLibrary:
     def _clear(self) -> None:
         """Lay the memory out again."""
         self.library.native_set_up(self._block, self.code.transcription.n)
+        self.arrays.sizes[:] = self.code.sizes
+
+    def shift(self, t0: float, duration: float) -> None:
+        """Write the plan in ``plan_t``, ..., moved to begin at t0 [s], into the iterate."""
+        self.library.native_shift(self._block, t0, duration)
+
+    def begin(self) -> None:
+        """Move the iterate into its bounds, and keep it for ``account``."""
+        self.library.native_begin(self._block)
+
+    def account(self) -> NativeAccount:
+        """Move the answer into its bounds, with the costate of a given start; say its worth."""
+        account = NativeAccount()
+        self.library.native_account(self._block, ctypes.byref(account))
+        return account
 
     def solve(self, options: NativeOptions) -> int:
         """Solve from what is in the arrays; return how it ended, an ``Ending``.
@@ -137,15 +172,13 @@ class NativeLibrary:
 
     def report(self) -> NativeReport:
         """Return what the last solve has come to."""
-        numbers = (ctypes.c_double * _REPORT)()
-        self.library.native_report(self._block, numbers)
-        return NativeReport(*numbers)
+        self.library.native_report(self._block, self._numbers)
+        return NativeReport(*self._numbers)
 
     def notes(self) -> np.ndarray:
         """Return what is noted of the iterations, one row each, in the order of ``Note``."""
-        notes = np.empty((_NOTED, len(NOTE)))
-        pointer = notes.ctypes.data_as(ctypes.c_void_p)
-        return notes[: self.library.native_notes(self._block, pointer)]
+        count = self.library.native_notes(self._block, ctypes.byref(self._notes))
+        return np.frombuffer(self._notes)[: count * len(NOTE)].reshape(count, -1).copy()
 
     def lagrangian_gradient(self) -> np.ndarray:
         """Return what multipliers of given unknowns balance, (N + 1, nu + nx) in (u, x)."""
@@ -166,6 +199,16 @@ class NativeLibrary:
         return np.zeros(self.library.native_bytes(n) + _LINE, dtype=np.uint8)
 
     @cached_property
+    def _numbers(self) -> "ctypes.Array[ctypes.c_double]":
+        """Where a report is written."""
+        return (ctypes.c_double * _REPORT)()
+
+    @cached_property
+    def _notes(self) -> "ctypes.Array[ctypes.c_double]":
+        """Where notes are written."""
+        return (ctypes.c_double * (_NOTED * len(NOTE)))()
+
+    @cached_property
     def _block(self) -> ctypes.c_void_p:
         """The memory, laid out."""
         address = self._memory.ctypes.data
@@ -181,10 +224,12 @@ class NativeLibrary:
         nw, total = nx + nu, code.row_total
         states, controls, nodes = (m, nx), (m - 1, nu), (m, nw)
         shapes = {name: (rows,) for name in NativeArrays._fields}
-        shapes |= dict.fromkeys(("x", "costate", "dx", "dcostate"), states)
-        shapes |= dict.fromkeys(("u", "u_given", "du"), controls)
+        states_of = ("x", "costate", "dx", "dcostate", "plan_x", "plan_costate")
+        shapes |= dict.fromkeys(states_of, states)
+        shapes |= dict.fromkeys(("u", "u_given", "du", "plan_u"), controls)
         shapes |= dict.fromkeys(("gradient", "rhs"), nodes)
         shapes |= {"data": (m, code.nd), "x_given": (nx,), "gap": (m - 1, nx)}
+        shapes |= {"sizes": (nx,), "plan_t": (m,), "half_step": (m - 1, nx)}
         shapes |= {"slope": (m - 1, nx, nw), "hessian": (m, nw, nw), "c_slope": (total, nw)}
         pointers = (ctypes.POINTER(ctypes.c_double) * len(shapes))()
         self.library.native_arrays(self._block, pointers)

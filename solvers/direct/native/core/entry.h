@@ -20,7 +20,8 @@ void native_arrays(char *block, double **arrays) {
                    s->v,      s->z_low, s->z_up,    s->y,           s->x_given, s->u_given,
                    s->has_low, s->has_up, s->is_equation, s->gap,   s->slope,   s->gradient,
                    s->hessian, s->c_slope, s->sigma, s->rhs,        s->dx,      s->du,
-                   s->dlambda};
+                   s->dlambda, s->sizes,  s->plan_t, s->plan_x,     s->plan_u,  s->plan_lambda,
+                   s->half_step};
   memcpy(arrays, all, sizeof all);
 }
 
@@ -49,6 +50,28 @@ void native_read_bounds(char *block) {
     if (s->has_low[i] + s->is_equation[i] == 0.0) s->low[i] = 0.0;
     if (s->has_up[i] == 0.0) s->up[i] = 0.0;
   }
+}
+
+/* Write the plan, moved to begin at t0 [s], into x, u and lambda. */
+void native_shift(char *block, double t0, double duration) {
+  shift_plan((Workspace *)block, t0, duration);
+}
+
+/* Move x and u into their bounds, and keep u, for native_account(). */
+void native_begin(char *block) {
+  Workspace *s = (Workspace *)block;
+  clip_to_bounds(s);
+  memcpy(s->u_first, s->u, sizeof(double) * (size_t)s->n * NU);
+}
+
+/* Say what the answer is worth; move it into its bounds, which it may leave by the tolerance, and
+ * write the costate of a given start. */
+void native_account(char *block, Account *account) {
+  Workspace *s = (Workspace *)block;
+  clip_to_bounds(s);
+  costate_of_start(s);
+  account->moved = half_step_error(s, &account->node);
+  account->unmoved = unmoved_controls(s);
 }
 
 /* Solve from the iterate in x, u and lambda; begin = 0: go on after PAUSED. */

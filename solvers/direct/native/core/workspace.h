@@ -17,6 +17,7 @@
  *   stage_slope(x, u, d, lambda, y)     the same without the last
  *   start_value(x, d), start_full(x, d, y)   c   |   c, c_w, (y'c)_ww
  *   end_value(x, d), end_full(x, d, y)       l, c   |   l, c, l_w, c_w, (l + y'c)_ww
+ *   stage_half(x, u, d)                 next state, with half the integration step
  */
 
 #include <math.h>
@@ -88,6 +89,12 @@ typedef struct {
   /* 1.0 where an entry of u, or of x_0, is given and not an unknown. */
   double *u_given, *x_given;
   double sides; /* number of slacks */
+  double *sizes; /* of the states, (NX): what the accuracy of the integration is relative to */
+
+  /* The plan that a warm start is read off from: its nodes [s], states, controls, costates. */
+  double *plan_t, *plan_x, *plan_u, *plan_lambda;
+  double *u_first;   /* controls of the first iterate */
+  double *half_step; /* by how much half the integration step moves the ends of the intervals */
 
   /* Step. */
   double *dx, *du, *dlambda, *ds_low, *dz_low, *ds_up, *dz_up, *dy;
@@ -156,8 +163,10 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->n = n;
   s->rows = rows_begin(n) + NB + NE;
   double **states[] = {&s->x,  &s->lambda,  &s->dx,      &s->dlambda,
-                       &s->ex, &s->elambda, &s->x_trial, &s->p};
-  double **controls[] = {&s->u, &s->du, &s->eu, &s->u_trial, &s->kappa, &s->pivot, &s->u_given};
+                       &s->ex, &s->elambda, &s->x_trial, &s->p,
+                       &s->plan_x, &s->plan_lambda};
+  double **controls[] = {&s->u,     &s->du,      &s->eu,     &s->u_trial, &s->kappa,
+                         &s->pivot, &s->u_given, &s->plan_u, &s->u_first};
   double **flat[] = {&s->s_low,  &s->z_low,    &s->s_up,   &s->z_up,    &s->y,     &s->low,
                      &s->up,     &s->has_low,  &s->has_up, &s->is_equation, &s->ds_low, &s->dz_low,
                      &s->ds_up,  &s->dz_up,    &s->dy,     &s->ey,      &s->v,     &s->v_trial,
@@ -169,9 +178,12 @@ static char *lay_out(Workspace *s, char *at, int n) {
   for (size_t i = 0; i < sizeof flat / sizeof *flat; i++)
     *flat[i] = take(&at, (size_t)AT_LEAST_1(s->rows));
   s->x_given = take(&at, NX);
+  s->sizes = take(&at, NX);
+  s->plan_t = take(&at, m);
   s->data = take(&at, m * ND);
   s->gap = take(&at, m * NX);
   s->gap_trial = take(&at, m * NX);
+  s->half_step = take(&at, m * NX);
   s->slope = take(&at, m * NX * NW);
   s->gradient = take(&at, m * NW);
   s->rhs = take(&at, m * NW);
