@@ -10,6 +10,8 @@ from solvers.direct.native.stage_code import StageCode
 
 # By how much compiled numbers may differ, relative to 1 + abs(value).
 _SAME = 1e-6
+# A state that is moved further by one interval has exploded.
+_TAME = 1e3
 
 
 def first_difference(
@@ -40,7 +42,9 @@ def first_difference(
                 return f"{name}, at order {order}"
     at.sizes[:], at.half_step[:] = 1.0, np.nan
     account()
-    return None if _is_same(at.half_step, known["half_step"]) else "the half step"
+    # At a random point some stages explode, and twice as many steps on the way keep no digit.
+    tame = np.where(np.abs(known["half_step"]) < _TAME, known["half_step"], np.nan)
+    return None if _is_same(at.half_step, tame) else "the half step"
 
 
 def _is_same(found: np.ndarray, right: np.ndarray) -> bool:

@@ -177,8 +177,8 @@ class NativeLibrary:
 
     def notes(self) -> np.ndarray:
         """Return what is noted of the iterations, one row each, in the order of ``Note``."""
-        count = self.library.native_notes(self._block, ctypes.byref(self._notes))
-        return np.frombuffer(self._notes)[: count * len(NOTE)].reshape(count, -1).copy()
+        memory, notes = self._notes
+        return notes[: self.library.native_notes(self._block, memory)].copy()
 
     def lagrangian_gradient(self) -> np.ndarray:
         """Return what multipliers of given unknowns balance, (N + 1, nu + nx) in (u, x)."""
@@ -204,9 +204,10 @@ class NativeLibrary:
         return (ctypes.c_double * _REPORT)()
 
     @cached_property
-    def _notes(self) -> "ctypes.Array[ctypes.c_double]":
-        """Where notes are written."""
-        return (ctypes.c_double * (_NOTED * len(NOTE)))()
+    def _notes(self) -> tuple[ctypes.c_void_p, np.ndarray]:
+        """Where notes are written, and as an array."""
+        notes = np.empty((_NOTED, len(NOTE)))
+        return ctypes.c_void_p(notes.ctypes.data), notes
 
     @cached_property
     def _block(self) -> ctypes.c_void_p:
