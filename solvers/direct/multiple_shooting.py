@@ -1,5 +1,6 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import ClassVar, Literal
@@ -160,11 +161,19 @@ class MultipleShootingProgram(MethodProgram):
     grid: ShootingGrid
     nlp: Nlp
 
-    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
-        """Solve for these data, in the phases of ``NlpRun``."""
+    def _begun(
+        self, data: RunData, guess: InitialGuess | None
+    ) -> RunResult | Callable[[], RunResult]:
+        """Solve from an earlier plan, or return what solves; see ``WarmRun``."""
         warm = self._warm_run(data, guess) if self._warm_run and guess else None
         if isinstance(warm, RunResult):
             return warm
+        return partial(self._solve, data, guess, warm)
+
+    def _solve(
+        self, data: RunData, guess: InitialGuess | None, warm: WarmStart | None = None
+    ) -> RunResult:
+        """Solve for these data, in the phases of ``NlpRun``; go on after a warm run, if any."""
         ocp, duration = self.ocp, first_duration(self.ocp, guess)
 
         def first(duration: float, source: FirstStates) -> np.ndarray:
@@ -201,6 +210,11 @@ class MultipleShootingProgram(MethodProgram):
             backend = replace(backend, name="ipopt")
         nlp = backend.build(self._without_slope)
         return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
+
+    @property
+    def seconds_in_c(self) -> float | None:
+        """What the native backend's last run took, by its own clock [s]; None of other backends."""
+        return self.nlp.run.library.report().seconds if isinstance(self.nlp, NativeNlp) else None
 
     # -- the first iterate -------------------------------------------------------------------
 

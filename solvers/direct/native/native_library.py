@@ -14,7 +14,7 @@ from solvers.direct.native.native_arrays import NativeArrays
 from solvers.direct.native.stage_code import StageCode
 
 _LINE = 64  # bytes that memory is aligned to
-_REPORT = 12  # numbers of ``native_report``
+_REPORT = 13  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
 _NOTED = 512  # iterations of which something is noted
 #: What is noted of an iteration.
@@ -37,6 +37,7 @@ class NativeReport(NamedTuple):
         is_monotone: whether the barrier parameter has become so.
         shift: of the last Hessian.
         barrier: the last barrier parameter.
+        seconds: of the solve, by the clock of the library [s].
     """
 
     cost: float
@@ -51,6 +52,7 @@ class NativeReport(NamedTuple):
     is_monotone: float
     shift: float
     barrier: float
+    seconds: float
 
 
 class NativeAccount(ctypes.Structure):

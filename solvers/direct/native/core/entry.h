@@ -84,7 +84,8 @@ void native_report(const char *block, double *report) {
   const Workspace *s = (const Workspace *)block;
   const double all[] = {s->cost,           s->left.dual,      s->left.primal, s->left.product,
                         s->left.multiplier, s->iteration,     s->factorisations, s->evaluations,
-                        s->values,         s->is_monotone,    s->shift,       s->mu};
+                        s->values,         s->is_monotone,    s->shift,       s->mu,
+                        s->seconds};
   memcpy(report, all, sizeof all);
 }
 

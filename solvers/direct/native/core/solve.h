@@ -229,6 +229,7 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     s->iteration = s->is_monotone = s->filter_size = 0;
     s->factorisations = s->evaluations = s->values = 0;
     s->length = 1.0;
+    s->seconds = 0.0;
     s->best = INFINITY;
     s->since_best = 0;
     if (o->monotone != 0.0) s->is_monotone = 1;
