@@ -25,6 +25,7 @@ from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.method.blocking_solver import BlockingSolver
+from ocp.method.feedback_program import FeedbackMethodProgram
 from ocp.method.in_normal_form import InNormalForm
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
@@ -84,6 +85,7 @@ __all__ = [
     "ConstraintRows",
     "ControlBlocks",
     "Epigraph",
+    "FeedbackMethodProgram",
     "ImposedRows",
     "InNormalForm",
     "Jump",

@@ -67,7 +67,14 @@ class MethodProgram(BuiltProgram):
             found = self._begun(data, first)
             result = found if isinstance(found, RunResult) else _finished(found)
             seconds = perf_counter() - started
-        solution = Solution(
+        solution = self._solution(data, result, seconds)
+        if self._is_done(solution):
+            return solution
+        return self._checked(solution)
+
+    def _solution(self, data: RunData, result: RunResult, seconds: float) -> Solution:
+        """Return what a method has found as a solution."""
+        return Solution(
             problem=self.ocp,
             solver=self._solver_text,
             status=result.status,
@@ -87,9 +94,6 @@ class MethodProgram(BuiltProgram):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
-        if self._is_done(solution):
-            return solution
-        return self._checked(solution)
 
     def _is_done(self, solution: Solution) -> bool:
         """Whether nothing else is to be looked for in a solution."""

@@ -88,6 +88,26 @@ class InputCollector:
         unsolvable = joined(unknown, missing)
         return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable, seen)
 
+    def expected(
+        self, state: ControllerState, given: Mapping[str, ArrayLike] | None
+    ) -> StepInputs | None:
+        """Return the data that the next step will have if the model is right; None: nobody knows.
+
+        Args:
+            state: what is known after a step.
+            given: parameters of the horizon of the next step; None: what the controller's own say.
+        """
+        seen = state.seen
+        if seen is None or not seen.acting:
+            return None
+        t = seen.t + self.dt
+        p, unknown = self._horizon_parameters(state, t + self.delay, given)
+        acting, at_effect = seen.acting, p.at(t + self.delay)
+        start = seen.x
+        for k, sent in enumerate(acting if self.compensate else acting[:1]):
+            start = self._next_state(start, sent, seen.t + k * self.dt, at_effect)
+        return StepInputs(t, t + self.delay, start, p, at_effect, not unknown, unknown, None)
+
     def _expected(
         self, state: ControllerState, measured: np.ndarray, t: float, p: np.ndarray
     ) -> np.ndarray:

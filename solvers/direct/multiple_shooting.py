@@ -11,7 +11,7 @@ from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Program
 from ocp.internal import (
     BlockingSolver,
     Epigraph,
-    MethodProgram,
+    FeedbackMethodProgram,
     RunData,
     RunResult,
     Transcription,
@@ -147,7 +147,7 @@ class MultipleShooting(BlockingSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class MultipleShootingProgram(MethodProgram):
+class MultipleShootingProgram(FeedbackMethodProgram):
     """A transcribed problem with its backend.
 
     Attributes:
@@ -165,6 +165,7 @@ class MultipleShootingProgram(MethodProgram):
         self, data: RunData, guess: InitialGuess | None
     ) -> RunResult | Callable[[], RunResult]:
         """Solve from an earlier plan, or return what solves; see ``WarmRun``."""
+        self.forget_feedback()
         warm = self._warm_run(data, guess) if self._warm_run and guess else None
         if isinstance(warm, RunResult):
             return warm
@@ -210,6 +211,19 @@ class MultipleShootingProgram(MethodProgram):
             backend = replace(backend, name="ipopt")
         nlp = backend.build(self._without_slope)
         return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
+
+    # -- real-time iterations ----------------------------------------------------------------
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether the backend is the native one, and start and final time are given."""
+        return self._warm_run is not None
+
+    def _freeze(self, data: RunData, guess: InitialGuess | None) -> bool:
+        return bool(self._warm_run and guess and self._warm_run.freeze(data, guess))
+
+    def _fed_back(self, data: RunData) -> RunResult | None:
+        return self._warm_run.fed_back(data) if self._warm_run else None
 
     @property
     def seconds_in_c(self) -> float | None:

@@ -34,7 +34,7 @@ int main(void) {
   memcpy(arrays[5], up, sizeof up);
   memcpy(arrays[10], x_given, sizeof x_given);
   native_read_bounds(block);
-  const Options options = {1e-9, 0.1, 300.0, INFINITY, INFINITY, 0.0, 0.0};
+  const Options options = {1e-9, 0.1, 300.0, INFINITY, INFINITY, 0.0, 0.0, 0.0};
   double report[13];
   const int ending = native_solve(block, &options, 1);
   native_report(block, report);

@@ -85,6 +85,7 @@ class NativeOptions(ctypes.Structure):
         ("pause", ctypes.c_double),
         ("warm", ctypes.c_double),
         ("monotone", ctypes.c_double),
+        ("frozen", ctypes.c_double),
     )
 
 
@@ -156,6 +157,10 @@ class NativeLibrary:
         account = NativeAccount()
         self.library.native_account(self._block, ctypes.byref(account))
         return account
+
+    def freeze(self) -> None:
+        """Freeze the program at the answer of the last solve, see ``frozen.h``."""
+        self.library.native_freeze(self._block)
 
     def solve(self, options: NativeOptions) -> int:
         """Solve from what is in the arrays; return how it ended, an ``Ending``.

@@ -16,6 +16,8 @@ from solvers.direct.warm_start import WarmStart
 
 # First barrier parameter, and that of a start with costates.
 _COLD, _WARM = 0.1, 1e-4
+# That of a program frozen at an answer, from the multipliers of that.
+_FROZEN = 1e-6
 # How long a solve may take before Python looks for signals [s].
 _PAUSE = 0.1
 # What ``Ending`` of ``workspace.h`` means, in words that ``return_words`` explains.
@@ -66,7 +68,15 @@ class NativeLimits:
             pause=_PAUSE,
             warm=float(warm),
             monotone=float(monotone),
+            frozen=0.0,
         )
+
+    @property
+    def of_frozen(self) -> NativeOptions:
+        """Those of a frozen program, see ``frozen.h``."""
+        options = self.options(_Way.WARM, 0, 0.0)
+        options.barrier, options.frozen = _FROZEN, 1.0
+        return options
 
 
 @dataclass(frozen=True, eq=False)

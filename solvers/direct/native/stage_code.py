@@ -24,6 +24,7 @@ _CORE = Path(__file__).with_name("core")
 _FILES = (
     "workspace",
     "evaluate",
+    "frozen",
     "riccati",
     "barrier",
     "line_search",

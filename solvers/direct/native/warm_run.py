@@ -4,7 +4,7 @@ In a control loop nearly every run is one of these. What it does is what ``NlpRu
 start whose answer needs nothing else; of any other answer ``NlpRun`` takes over.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 
@@ -23,6 +23,7 @@ from solvers.direct.nlp_verdict import NOT_STATIONARY, VIOLATED
 from solvers.direct.warm_start import WarmStart
 
 _SOLVED = ENDINGS.index("solved")
+_FED_BACK = "one real-time iteration, from the plan for the state that was expected"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,19 +45,50 @@ class WarmRun:
             the answer; where it is not optimal, not accurate, or some control did not move, how the
             run has ended; None where nothing was run: the guess has no states or costates.
         """
-        started, library, at = perf_counter(), self.solver.library, self._arrays
+        started, library = perf_counter(), self.solver.library
+        ending = self._ended(data, guess)
+        if ending == _SOLVED:
+            account, report = library.account(), library.report()
+            is_clean = self._is_right(account, report) and account.unmoved == 0.0
+            if is_clean and not start_violation(self._ocp, data):
+                return self._result(data, report)
+        return None if ending is None else WarmStart(None, ending, perf_counter() - started)
+
+    def freeze(self, data: RunData, guess: InitialGuess) -> bool:
+        """Run from a guess, and freeze the program at the answer; return whether there is one."""
+        library = self.solver.library
+        if self._ended(data, guess) != _SOLVED:
+            return False
+        if not self._is_right(library.account(), library.report()):
+            return False
+        library.freeze()
+        return True
+
+    def fed_back(self, data: RunData) -> RunResult | None:
+        """Return the answer of the program that was frozen last for another start; None: none.
+
+        The states are those of the frozen program, whose dynamics are linear.
+        """
+        library = self.solver.library
+        self._arrays.x[0] = data.x0
+        library.begin()
+        if library.solve(self._frozen_options) != _SOLVED:
+            return None
+        library.account()
+        return replace(
+            self._result(data, library.report()), status=Status.ITERATION_LIMIT, message=_FED_BACK
+        )
+
+    def _ended(self, data: RunData, guess: InitialGuess) -> int | None:
+        """Solve from a guess; return how that has ended, None where it has no first iterate."""
+        at, library = self._arrays, self.solver.library
         self.solver.put_data(data)
         if not self._begin(guess):
             return None
         at.x[0] = data.x0
         at.u[self._given] = self._given_controls
         library.begin()
-        ending = library.solve(self._options)
-        if ending == _SOLVED:
-            account, report = library.account(), library.report()
-            if self._is_clean(account, report) and not start_violation(self._ocp, data):
-                return self._result(data, report)
-        return WarmStart(None, ending, perf_counter() - started)
+        return library.solve(self._options)
 
     def _begin(self, guess: InitialGuess) -> bool:
         """Write the first iterate; return whether the guess has one."""
@@ -82,12 +114,11 @@ class WarmRun:
         own = at.plan_t.shape, at.plan_x.shape, at.plan_u.shape
         return plan.control_kind == "held" and shapes == own
 
-    def _is_clean(self, account: NativeAccount, report: NativeReport) -> bool:
-        """Whether the answer needs nothing else; NaN does."""
+    def _is_right(self, account: NativeAccount, report: NativeReport) -> bool:
+        """Whether an answer is optimal and accurate; NaN is not."""
         is_optimal = report.dual <= NOT_STATIONARY * (1.0 + report.multiplier)
         is_accurate = self._ocp.model.is_discrete or account.moved <= self.accuracy
-        has_moved = account.unmoved == 0.0
-        return is_optimal and is_accurate and has_moved and report.primal <= VIOLATED
+        return is_optimal and is_accurate and report.primal <= VIOLATED
 
     def _result(self, data: RunData, report: NativeReport) -> RunResult:
         at, tr, notes = self._arrays, self._transcription, self.solver.library.notes()
@@ -133,3 +164,7 @@ class WarmRun:
     @cached_property
     def _options(self) -> NativeOptions:
         return self.solver.warm_options
+
+    @cached_property
+    def _frozen_options(self) -> NativeOptions:
+        return self.solver.limits.of_frozen

@@ -76,7 +76,18 @@ void native_account(char *block, Account *account) {
 
 /* Solve from the iterate in x, u and lambda; begin = 0: go on after PAUSED. */
 int native_solve(char *block, const Options *options, int begin) {
-  return iterate((Workspace *)block, options, begin);
+  Workspace *s = (Workspace *)block;
+  const Ending ending = iterate(s, options, begin);
+  s->is_frozen = 0;
+  return ending;
+}
+
+/* Freeze the program at the answer of a solve, for native_solve() with the option, once, with
+ * another start in x. */
+void native_freeze(char *block) {
+  Workspace *s = (Workspace *)block;
+  evaluate_at_iterate(s, 1);
+  freeze(s);
 }
 
 /* What a solve has come to. */

@@ -47,6 +47,7 @@ typedef struct {
   double pause;         /* after so long native_solve() returns PAUSED, to be called again [s] */
   double warm;          /* whether the costates are a guess of value */
   double monotone;      /* whether the barrier parameter only falls, from the beginning */
+  double frozen;        /* whether to solve the program of frozen.h, from its own multipliers */
 } Options;
 
 typedef enum {
@@ -112,6 +113,10 @@ typedef struct {
   double *hessian;   /* of the Lagrangian, [n + 1][NW][NW] */
   double *c_slope;   /* of the rows, one [NW] a row, in the order of the rows */
 
+  /* Where the program is frozen, see frozen.h, and what was evaluated there. */
+  int is_frozen;
+  double cost_frozen, *x_frozen, *u_frozen, *gap_frozen, *v_frozen, *gradient_frozen;
+
   /* Condensed system: weights and right-hand side. */
   double *r_low, *r_up, *r_y, *corr_low, *corr_up, *sigma, *force, *dv;
   double *rhs; /* [n + 1][NW] */
@@ -164,14 +169,14 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->rows = rows_begin(n) + NB + NE;
   double **states[] = {&s->x,  &s->lambda,  &s->dx,      &s->dlambda,
                        &s->ex, &s->elambda, &s->x_trial, &s->p,
-                       &s->plan_x, &s->plan_lambda};
+                       &s->plan_x, &s->plan_lambda, &s->x_frozen, &s->gap_frozen};
   double **controls[] = {&s->u,     &s->du,      &s->eu,     &s->u_trial, &s->kappa,
-                         &s->pivot, &s->u_given, &s->plan_u, &s->u_first};
+                         &s->pivot, &s->u_given, &s->plan_u, &s->u_first, &s->u_frozen};
   double **flat[] = {&s->s_low,  &s->z_low,    &s->s_up,   &s->z_up,    &s->y,     &s->low,
                      &s->up,     &s->has_low,  &s->has_up, &s->is_equation, &s->ds_low, &s->dz_low,
                      &s->ds_up,  &s->dz_up,    &s->dy,     &s->ey,      &s->v,     &s->v_trial,
                      &s->r_low,  &s->r_up,     &s->r_y,    &s->corr_low, &s->corr_up, &s->sigma,
-                     &s->force,  &s->dv};
+                     &s->force,  &s->dv,       &s->v_frozen};
   for (size_t i = 0; i < sizeof states / sizeof *states; i++) *states[i] = take(&at, m * NX);
   for (size_t i = 0; i < sizeof controls / sizeof *controls; i++)
     *controls[i] = take(&at, m * AT_LEAST_1(NU));
@@ -186,6 +191,7 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->half_step = take(&at, m * NX);
   s->slope = take(&at, m * NX * NW);
   s->gradient = take(&at, m * NW);
+  s->gradient_frozen = take(&at, m * NW);
   s->rhs = take(&at, m * NW);
   s->hessian = take(&at, m * NW * NW);
   s->c_slope = take(&at, ((size_t)NI + m * NC + NE + 1) * NW);
