@@ -316,7 +316,7 @@ class FallbackLadder:
     def prepare_step(
         self, state: ControllerState, parameters: Mapping[str, ArrayLike] | None
     ) -> bool:
-        """Prepare the plan of the next step, see ``MPC.prepare_next``; return whether there is one."""
+        """Prepare the plan of the next step, see ``MPC``; return whether there is one."""
         expected = self._inputs.expected(state, parameters)
         return expected is not None and self._solver.prepare(expected, state)
 

@@ -16,8 +16,9 @@ from solvers.direct.warm_start import WarmStart
 
 # First barrier parameter, and that of a start with costates.
 _COLD, _WARM = 0.1, 1e-4
-# That of a program frozen at an answer, from the multipliers of that.
-_FROZEN = 1e-6
+# Those of a program frozen at an answer, from the multipliers of that, one after the other where no
+# step is found: further from it bounds may be active that were not.
+_FROZEN = (1e-6, 1e-3, 1e-1)
 # How long a solve may take before Python looks for signals [s].
 _PAUSE = 0.1
 # What ``Ending`` of ``workspace.h`` means, in words that ``return_words`` explains.
@@ -72,11 +73,12 @@ class NativeLimits:
         )
 
     @property
-    def of_frozen(self) -> NativeOptions:
-        """Those of a frozen program, see ``frozen.h``."""
-        options = self.options(_Way.WARM, 0, 0.0)
-        options.barrier, options.frozen = _FROZEN, 1.0
-        return options
+    def of_frozen(self) -> tuple[NativeOptions, ...]:
+        """Those of a frozen program, see ``frozen.h``, to be tried in this order."""
+        options = [self.options(_Way.WARM, 0, 0.0) for _ in _FROZEN]
+        for each, barrier in zip(options, _FROZEN, strict=True):
+            each.barrier, each.frozen = barrier, 1.0
+        return tuple(options)
 
 
 @dataclass(frozen=True, eq=False)

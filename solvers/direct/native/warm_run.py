@@ -72,7 +72,7 @@ class WarmRun:
         library = self.solver.library
         self._arrays.x[0] = data.x0
         library.begin()
-        if library.solve(self._frozen_options) != _SOLVED:
+        if all(library.solve(options) != _SOLVED for options in self._frozen_options):
             return None
         library.account()
         return replace(
@@ -166,5 +166,5 @@ class WarmRun:
         return self.solver.warm_options
 
     @cached_property
-    def _frozen_options(self) -> NativeOptions:
+    def _frozen_options(self) -> tuple[NativeOptions, ...]:
         return self.solver.limits.of_frozen

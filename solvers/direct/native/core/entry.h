@@ -82,8 +82,8 @@ int native_solve(char *block, const Options *options, int begin) {
   return ending;
 }
 
-/* Freeze the program at the answer of a solve, for native_solve() with the option, once, with
- * another start in x. */
+/* Freeze the program at the answer of a solve, for native_solve() with the option and another start
+ * in x. */
 void native_freeze(char *block) {
   Workspace *s = (Workspace *)block;
   evaluate_at_iterate(s, 1);

@@ -7,15 +7,39 @@
  * start its answer for another one differs from that of the program itself by second-order terms.
  */
 
+/* What of the iterate is kept where the program is frozen: pairs of arrays with their lengths. */
+#define ITERATE(s)                                                                          \
+  {{s->x + NX, s->x_frozen + NX, (size_t)s->n * NX},                                        \
+   {s->u, s->u_frozen, (size_t)s->n * NU},                                                  \
+   {s->lambda, s->lambda_frozen, ((size_t)s->n + 1) * NX},                                  \
+   {s->s_low, s->s_low_frozen, (size_t)s->rows},                                            \
+   {s->z_low, s->z_low_frozen, (size_t)s->rows},                                            \
+   {s->s_up, s->s_up_frozen, (size_t)s->rows},                                              \
+   {s->z_up, s->z_up_frozen, (size_t)s->rows},                                              \
+   {s->y, s->y_frozen, (size_t)s->rows}}
+
+typedef struct {
+  double *own, *frozen;
+  size_t count;
+} Kept;
+
 /* Freeze the program at the iterate; needs evaluate_at_iterate() with second derivatives. */
 static void freeze(Workspace *s) {
-  const size_t m = (size_t)s->n + 1;
-  s->cost_frozen = s->cost;
-  memcpy(s->x_frozen, s->x, sizeof(double) * m * NX);
-  memcpy(s->u_frozen, s->u, sizeof(double) * (m - 1) * NU);
-  memcpy(s->gap_frozen, s->gap, sizeof(double) * (m - 1) * NX);
+  const Kept kept[] = ITERATE(s);
+  for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
+    memcpy(kept[i].frozen, kept[i].own, sizeof(double) * kept[i].count);
+  memcpy(s->x_frozen, s->x, sizeof(double) * NX);
+  memcpy(s->gap_frozen, s->gap, sizeof(double) * (size_t)s->n * NX);
   memcpy(s->v_frozen, s->v, sizeof(double) * (size_t)s->rows);
-  memcpy(s->gradient_frozen, s->gradient, sizeof(double) * m * NW);
+  memcpy(s->gradient_frozen, s->gradient, sizeof(double) * ((size_t)s->n + 1) * NW);
+  s->cost_frozen = s->cost;
+}
+
+/* Go back to where the program is frozen; the start stays. */
+static void go_back(Workspace *s) {
+  const Kept kept[] = ITERATE(s);
+  for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
+    memcpy(kept[i].own, kept[i].frozen, sizeof(double) * kept[i].count);
 }
 
 /* How far node k is from where the program is frozen, (NW). */

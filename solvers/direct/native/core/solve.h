@@ -120,6 +120,7 @@ static void keep_side(double mu, double *slack, double *multiplier) {
 
 /* Begin the frozen program where it was frozen, with the multipliers that were found there. */
 static void start_frozen(Workspace *s, double mu) {
+  go_back(s);
   for (int i = 0; i < s->rows; i++) {
     s->ds_low[i] = s->ds_up[i] = s->dz_low[i] = s->dz_up[i] = 0.0;
     s->corr_low[i] = s->corr_up[i] = 0.0;

@@ -116,6 +116,7 @@ typedef struct {
   /* Where the program is frozen, see frozen.h, and what was evaluated there. */
   int is_frozen;
   double cost_frozen, *x_frozen, *u_frozen, *gap_frozen, *v_frozen, *gradient_frozen;
+  double *lambda_frozen, *s_low_frozen, *z_low_frozen, *s_up_frozen, *z_up_frozen, *y_frozen;
 
   /* Condensed system: weights and right-hand side. */
   double *r_low, *r_up, *r_y, *corr_low, *corr_up, *sigma, *force, *dv;
@@ -169,14 +170,16 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->rows = rows_begin(n) + NB + NE;
   double **states[] = {&s->x,  &s->lambda,  &s->dx,      &s->dlambda,
                        &s->ex, &s->elambda, &s->x_trial, &s->p,
-                       &s->plan_x, &s->plan_lambda, &s->x_frozen, &s->gap_frozen};
+                       &s->plan_x, &s->plan_lambda, &s->x_frozen, &s->gap_frozen,
+                       &s->lambda_frozen};
   double **controls[] = {&s->u,     &s->du,      &s->eu,     &s->u_trial, &s->kappa,
                          &s->pivot, &s->u_given, &s->plan_u, &s->u_first, &s->u_frozen};
   double **flat[] = {&s->s_low,  &s->z_low,    &s->s_up,   &s->z_up,    &s->y,     &s->low,
                      &s->up,     &s->has_low,  &s->has_up, &s->is_equation, &s->ds_low, &s->dz_low,
                      &s->ds_up,  &s->dz_up,    &s->dy,     &s->ey,      &s->v,     &s->v_trial,
                      &s->r_low,  &s->r_up,     &s->r_y,    &s->corr_low, &s->corr_up, &s->sigma,
-                     &s->force,  &s->dv,       &s->v_frozen};
+                     &s->force,  &s->dv,       &s->v_frozen, &s->s_low_frozen,
+                     &s->z_low_frozen, &s->s_up_frozen, &s->z_up_frozen, &s->y_frozen};
   for (size_t i = 0; i < sizeof states / sizeof *states; i++) *states[i] = take(&at, m * NX);
   for (size_t i = 0; i < sizeof controls / sizeof *controls; i++)
     *controls[i] = take(&at, m * AT_LEAST_1(NU));
