@@ -26,6 +26,7 @@ from ocp.integration.stage_tape import StageInputs, StageTape
 from ocp.linear.linear_quadratic import LinearQuadratic, LQData, Matrices
 from ocp.linear.stationary import stationary
 from ocp.method.blocking_solver import BlockingSolver
+from ocp.method.feedback_program import FeedbackMethodProgram
 from ocp.method.in_normal_form import InNormalForm
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
@@ -70,6 +71,7 @@ from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
+from ocp.solution.shifted_plan import ShiftedPlan
 from ocp.solution.solver import BuiltProgram
 
 __all__ = [
@@ -84,6 +86,7 @@ __all__ = [
     "ConstraintRows",
     "ControlBlocks",
     "Epigraph",
+    "FeedbackMethodProgram",
     "ImposedRows",
     "InNormalForm",
     "Jump",
@@ -101,6 +104,7 @@ __all__ = [
     "RunResult",
     "ScaledOCP",
     "ScalingSolver",
+    "ShiftedPlan",
     "Sizes",
     "Stage",
     "StageInputs",

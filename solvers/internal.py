@@ -3,6 +3,7 @@
 from solvers.certify.certificate import Check, Estimate, Verdict
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
+from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.indirect.reverse.invariant_manifold import InvariantManifold
 from solvers.indirect.reverse.scan import Scan
 from solvers.indirect.reverse.self_motion import SelfMotion, seeds_around, self_motions
@@ -18,6 +19,7 @@ __all__ = [
     "InvariantManifold",
     "Inverse",
     "Level",
+    "MultipleShootingProgram",
     "Scan",
     "SelfMotion",
     "Severity",

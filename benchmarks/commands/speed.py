@@ -10,7 +10,7 @@ from benchmarks.speed.arm import INTERVALS, LINKS
 from benchmarks.speed.arm_tables import print_arm_speed
 from benchmarks.speed.linear import HORIZONS
 from benchmarks.speed.linear_tables import print_speed
-from benchmarks.speed.native import measured, native_table, races
+from benchmarks.speed.native import layers, layers_table, measured, native_table, races
 from benchmarks.speed.phases_tables import print_phases_speed
 
 
@@ -53,11 +53,16 @@ def _phases(options: Namespace, console: Console) -> int:
 
 def _native_options(parser: ArgumentParser) -> None:
     parser.add_argument("--count", type=positive, default=40, metavar="K", help="solves measured")
+    parser.add_argument(
+        "--steps", type=positive, default=10_000, metavar="K", help="control steps measured"
+    )
 
 
 def _native(options: Namespace, console: Console) -> int:
     for race in races():
         console.print(native_table(race, measured(race, options.count)))
+        if race.is_warm:
+            console.print(layers_table(race, layers(race, options.steps)))
     return 0
 
 

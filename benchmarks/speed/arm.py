@@ -11,7 +11,7 @@ from time import process_time
 import numpy as np
 
 from models import random_scenarios
-from ocp import MPC, OCP, InputSource, PlantInput, Solver, solve
+from ocp import MPC, OCP, PlantInput, Solver, solve
 from solvers import IndirectShooting, MultipleShooting, Schuetz, StagewiseNewton
 
 INTERVALS = (10, 20, 35, 50, 100, 200)
@@ -122,7 +122,7 @@ class Racing:
             started = process_time()
             decision = mpc.step(measured, k * DT)
             self._times[key].append(process_time() - started)
-            is_new = decision.source in (InputSource.OPTIMAL, InputSource.FEASIBLE)
+            is_new = decision.source.is_planned
             self._planned[key] += k >= _WARM and is_new
             rates.append(decision.input)
         self._x = self._x + DT * rates[0]

@@ -12,7 +12,7 @@ that waits for its next sample is in no better place.
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, sleep
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from rich.table import Table
 
 from benchmarks.speed.arm import DT, NOISE, N, arm
+from benchmarks.speed.timed_solver import Timed
 from ocp import MPC, OCP, FlightRecorder, InitialGuess, PlantInput, Program, Solution, Solver, solve
 from solvers import MultipleShooting
 
@@ -65,41 +66,6 @@ class Overhead:
     solving: Spread
     driver: Spread
     recorder: Spread
-
-
-@dataclass(frozen=True, eq=False)
-class _Timed(Solver):
-    """A solver whose runs are timed, in the order in which they are made."""
-
-    inner: Solver
-    times: list[float] = field(default_factory=list)
-
-    def for_control_loop(self, *, compiled: bool, time_limit: float) -> "_Timed":
-        """Set what is left open; see ``Solver``."""
-        inner = self.inner.for_control_loop(compiled=compiled, time_limit=time_limit)
-        return replace(self, inner=inner)
-
-    def build(self, ocp: OCP) -> "_TimedProgram":
-        return _TimedProgram(self.inner.build(ocp), self.times)
-
-
-@dataclass(frozen=True, eq=False)
-class _TimedProgram(Program):
-    inner: Program
-    times: list[float]
-
-    def run(
-        self,
-        *,
-        x0: ArrayLike | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, ArrayLike] | None = None,
-        guess: InitialGuess | None = None,
-    ) -> Solution:
-        started = perf_counter()
-        found = self.inner.run(x0=x0, t0=t0, parameters=parameters, guess=guess)
-        self.times.append(perf_counter() - started)
-        return found
 
 
 # What else a stand-in does with x0 and t0.
@@ -161,7 +127,7 @@ def driver_overhead(count: int = 200) -> list[Overhead]:
     the caches is its own.
     """
     ocp, rng = arm(), np.random.default_rng(0)
-    timed = {name: _Timed(solver) for name, solver in _contenders(ocp).items()}
+    timed = {name: Timed(solver) for name, solver in _contenders(ocp).items()}
     racing = {
         name: MPC(ocp=ocp, solver=solver, dt=DT, applied=PlantInput("rate"))
         for name, solver in timed.items()

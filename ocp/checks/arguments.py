@@ -1,6 +1,7 @@
 """Checks of what a user gives, in words that name what is wrong."""
 
 from collections.abc import Iterable
+from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -212,12 +213,19 @@ def check_numbers(
     vector = vector.reshape(-1)
     if vector.size != size:
         raise ProblemError(f"{what} has {vector.size} entries, {size} are needed")
+    # Where the sum of squares is finite all are: what each run asks for has a quick answer.
+    if not isfinite(np.vdot(vector, vector)):
+        _refuse_wrong(vector, what, finite=finite)
+    vector.flags.writeable = False
+    return vector
+
+
+def _refuse_wrong(vector: np.ndarray, what: str, *, finite: bool) -> None:
+    """Refuse NaN, and infinity where ``finite``."""
     wrong = np.flatnonzero(~np.isfinite(vector) if finite else np.isnan(vector))
     if wrong.size:
         needed = "a finite number" if finite else "a number"
         raise ProblemError(f"{what}[{wrong[0]}] is {vector[wrong[0]]}, {needed} is needed")
-    vector.flags.writeable = False
-    return vector
 
 
 def check_nominal(values: ArrayLike | None, size: int, what: str) -> np.ndarray | None:

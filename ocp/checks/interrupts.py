@@ -31,6 +31,7 @@ def interruptible(call: Callable[P, T]) -> Callable[P, T]:
 
     When CasADi converts its arguments it clears whatever exception is on its way. So the main
     thread, the only one that Python's handlers run in, notes what the handler of Ctrl-C raises.
+    That takes 20 us: what calls no CasADi does without.
     """
 
     @wraps(call)

@@ -16,6 +16,7 @@ class InputSource(Enum):
     """Which rung of the ladder the input comes from, best first."""
 
     OPTIMAL = "the first control of a plan that meets the optimality conditions"
+    REAL_TIME = "the first control of a plan for the expected state, corrected by the measured one"
     FEASIBLE = "the first control of a new plan that meets the constraints, but is not optimal"
     SHIFTED = "the next control of an earlier plan whose remainder still meets the constraints"
     LEAST_VIOLATING = "the first control of the plan that violates the constraints least"
@@ -24,7 +25,7 @@ class InputSource(Enum):
     @property
     def is_planned(self) -> bool:
         """Whether the plan was made for this very instant."""
-        return self in (InputSource.OPTIMAL, InputSource.FEASIBLE)
+        return self in (InputSource.OPTIMAL, InputSource.REAL_TIME, InputSource.FEASIBLE)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,6 +77,15 @@ class Decision(StepReport):
     plan: Solution | None = None
     age: int = 0
     clipped: float = 0.0
+
+
+@runtime_checkable
+class PreparingController(Protocol):
+    """A controller that uses the rest of an interval: ``MPC`` with ``real_time``."""
+
+    def prepare_next(self) -> bool:
+        """Prepare the next step, after one; return whether it is prepared."""
+        ...
 
 
 class ControlRefused(OCPError, RuntimeError):

@@ -15,7 +15,12 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.errors import ProblemError
-from ocp.closed_loop.decision import Controller, ControlRefused, Decision
+from ocp.closed_loop.decision import (
+    Controller,
+    ControlRefused,
+    Decision,
+    PreparingController,
+)
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.plant import Plant, RunningPlant
 from ocp.closed_loop.rollout import Rollout
@@ -93,6 +98,8 @@ def closed_loop(
         except ControlRefused as refusal:
             journal.ended = str(refusal)
             break
+        if isinstance(controller, PreparingController):
+            controller.prepare_next()
         ahead.append(decision.input)
         if k >= 0:
             journal.advance(told, decision, ahead.pop(0), dt)

@@ -10,6 +10,7 @@ from ocp.loop_plotting.loop_record import LoopRecord
 # Of the sources of an input.
 COLOURS = {
     "OPTIMAL": "#2f7fb8",
+    "REAL_TIME": "#5b5fc7",
     "FEASIBLE": "#3aa98f",
     "SHIFTED": "#e8710a",
     "LEAST_VIOLATING": "#a0429e",

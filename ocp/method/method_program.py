@@ -1,9 +1,9 @@
 """One ``run`` for all methods: each computes a ``RunResult``, and a ``Solution`` is made of it."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from threading import Lock
 from time import perf_counter
 
@@ -16,6 +16,7 @@ from ocp.method.judged import judged
 from ocp.method.method_solver import MethodSolver
 from ocp.problem.end_of_definition import end_of_definition
 from ocp.problem.run_data import RunData
+from ocp.problem.switches import switches
 from ocp.solution.jumps import jumps_along
 from ocp.solution.solution import ControlKind, Solution
 from ocp.solution.solver import BuiltProgram, InitialGuess
@@ -50,7 +51,6 @@ class MethodProgram(BuiltProgram):
     # What a run writes to, memory of compiled code first of all, is one for all runs.
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
-    @interruptible
     def run(
         self,
         *,
@@ -64,9 +64,17 @@ class MethodProgram(BuiltProgram):
         first = self._first_guess(guess)
         with self._lock:
             started = perf_counter()
-            result = self._solve(data, first)
+            found = self._begun(data, first)
+            result = found if isinstance(found, RunResult) else _finished(found)
             seconds = perf_counter() - started
-        solution = Solution(
+        solution = self._solution(data, result, seconds)
+        if self._is_done(solution):
+            return solution
+        return self._checked(solution)
+
+    def _solution(self, data: RunData, result: RunResult, seconds: float) -> Solution:
+        """Return what a method has found as a solution."""
+        return Solution(
             problem=self.ocp,
             solver=self._solver_text,
             status=result.status,
@@ -86,6 +94,16 @@ class MethodProgram(BuiltProgram):
             parameters=data.values.as_dict(),
             solve_time=seconds,
         )
+
+    def _is_done(self, solution: Solution) -> bool:
+        """Whether nothing else is to be looked for in a solution."""
+        if self.solver.judged or not solution.status.is_success:
+            return False
+        return not self._differentiates or switches(self.ocp) is None
+
+    @interruptible
+    def _checked(self, solution: Solution) -> Solution:
+        """Return a solution with what a look at its trajectory adds."""
         if undefined := _undefined(solution):
             return solution.with_(message="; ".join(filter(None, [solution.message, undefined])))
         if self._differentiates and (jumped := _across_a_jump(solution)):
@@ -98,6 +116,12 @@ class MethodProgram(BuiltProgram):
     def _differentiates(self) -> bool:
         """Whether the method uses derivatives along the trajectory."""
         return True
+
+    def _begun(
+        self, data: RunData, guess: InitialGuess | None
+    ) -> RunResult | Callable[[], RunResult]:
+        """Solve for checked data without CasADi, or return what solves with it; here the latter."""
+        return partial(self._solve, data, guess)
 
     @abstractmethod
     def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
@@ -115,6 +139,11 @@ class MethodProgram(BuiltProgram):
     @cached_property
     def _solver_text(self) -> str:
         return repr(self.solver)
+
+
+@interruptible
+def _finished(solve: Callable[[], RunResult]) -> RunResult:
+    return solve()
 
 
 def _undefined(solution: Solution) -> str:

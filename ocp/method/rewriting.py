@@ -13,7 +13,7 @@ from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
-from ocp.solution.solver import InitialGuess, Program
+from ocp.solution.solver import FeedbackProgram, InitialGuess, Program
 
 
 class Rewriting(ABC):
@@ -47,7 +47,7 @@ class Rewriting(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class RewrittenProgram(Program):
+class RewrittenProgram(FeedbackProgram):
     """A program in terms of a method, asked and answering in those of the user.
 
     Attributes:
@@ -84,9 +84,55 @@ class RewrittenProgram(Program):
             parameters=self.rewriting.parameters(parameters),
             guess=None if given is None else self.rewriting.guess(given, data),
         )
-        answer = self.rewriting.answer(found)
-        answer = answer.with_(x0=data.x0, solve_time=perf_counter() - started)
+        answer = self._answer(found, data, started)
         return judged(answer, self.accuracy, slack=self.slack)
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether the inner program does."""
+        return isinstance(self.program, FeedbackProgram) and self.program.feeds_back
+
+    def prepare_feedback(
+        self,
+        *,
+        x0: ArrayLike,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: InitialGuess | None = None,
+    ) -> bool:
+        """Solve for the expected data, see ``FeedbackProgram``."""
+        if not isinstance(self.program, FeedbackProgram):
+            return False
+        original = self.rewriting.original
+        data, given = RunData.of(original, x0, t0, parameters), original.first_guess(guess)
+        return self.program.prepare_feedback(
+            x0=self.rewriting.start(data),
+            t0=t0,
+            parameters=self.rewriting.parameters(parameters),
+            guess=None if given is None else self.rewriting.guess(given, data),
+        )
+
+    def feedback(
+        self,
+        *,
+        x0: ArrayLike,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Solution | None:
+        """Correct the answer that was prepared, see ``FeedbackProgram``."""
+        if not isinstance(self.program, FeedbackProgram):
+            return None
+        started, data = perf_counter(), RunData.of(self.rewriting.original, x0, t0, parameters)
+        found = self.program.feedback(
+            x0=self.rewriting.start(data),
+            t0=t0,
+            parameters=self.rewriting.parameters(parameters),
+        )
+        return None if found is None else self._answer(found, data, started)
+
+    def _answer(self, found: Solution, data: RunData, started: float) -> Solution:
+        answer = self.rewriting.answer(found)
+        return answer.with_(x0=data.x0, solve_time=perf_counter() - started)
 
 
 # What a guess says of a part of a trajectory, (k, width), or None.

@@ -78,6 +78,7 @@ class FallbackLadder:
     budget: float
     tolerance: float
     compiled: bool
+    real_time: bool
 
     def step(
         self,
@@ -161,8 +162,7 @@ class FallbackLadder:
         if clock.is_over():
             why = clock.said if solved.plan is not None else ""
         elif solved.plan is not None:
-            best = InputSource.OPTIMAL if solved.status is Status.SOLVED else InputSource.FEASIBLE
-            selected, why = self._follow(solved.plan, now, best)
+            selected, why = self._follow(solved.plan, now, _source_of(solved))
             if selected is not None:
                 return selected, why
         selected, reason = self._follow_shifted(state.plan, now, inputs.parameters)
@@ -288,6 +288,7 @@ class FallbackLadder:
             check=self._check,
             guess=self.guess,
             tolerance=self.tolerance,
+            real_time=self.real_time,
         )
 
     @cached_property
@@ -311,3 +312,17 @@ class FallbackLadder:
     def prepare(self) -> None:
         """Build what a step may need, so that no step waits for it."""
         self._input_limits.prepare()
+
+    def prepare_step(
+        self, state: ControllerState, parameters: Mapping[str, ArrayLike] | None
+    ) -> bool:
+        """Prepare the plan of the next step, see ``MPC``; return whether there is one."""
+        expected = self._inputs.expected(state, parameters)
+        return expected is not None and self._solver.prepare(expected, state)
+
+
+def _source_of(solved: SolvedStep) -> InputSource:
+    """Return what a new plan is."""
+    if solved.is_corrected:
+        return InputSource.REAL_TIME
+    return InputSource.OPTIMAL if solved.status is Status.SOLVED else InputSource.FEASIBLE

@@ -157,6 +157,8 @@ def replay_all(mpc: MPC, path: str | Path, steps: Iterable[int]) -> Iterator[Rep
         # A stateful solver has to run at all the steps before.
         if k in wanted or again.is_stateful:
             again.state = state
+            if record.source is InputSource.REAL_TIME:
+                again.prepare_next(parameters=record.parameters)
             found = Replay(record, _again(again, record))
             if k in wanted:
                 wanted.remove(k)

@@ -32,7 +32,7 @@ from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.step_inputs import Parameters
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import row_sizes
-from ocp.solution.solver import InitialGuess, Solver
+from ocp.solution.solver import FeedbackProgram, InitialGuess, Solver
 
 T = TypeVar("T")
 
@@ -49,7 +49,8 @@ class MPC:
     always finite and within its bounds. Where the new plan cannot be used, the next rung of
     this ladder is taken, and the decision says so:
 
-    1. the new plan, ``OPTIMAL``, or ``FEASIBLE`` where the solver stopped early: then the
+    1. the new plan, ``OPTIMAL``; with ``real_time`` the prepared one, ``REAL_TIME``; or
+       ``FEASIBLE`` where the solver stopped early: then the
        model is run under its controls, and it must meet the constraints;
     2. the remainder of the last good plan, ``SHIFTED``, run on the model from the measured
        state: it must meet the constraints;
@@ -97,6 +98,8 @@ class MPC:
         tolerance: by how much an input may leave its bounds, or a plan the constraints, before
             that is a failure, in the sizes of the rows where the problem is scaled; an input that
             leaves them by less is clipped, and it is recorded.
+        real_time: whether the rest of each interval prepares the next step: see ``prepare_next``.
+            Only solvers that can: ``MultipleShooting(backend="native")``.
         compiled: whether the solver, where it has such an option, and the model run as machine
             code. The first build takes seconds; see ``compiled``.
 
@@ -122,6 +125,7 @@ class MPC:
     least_violating: bool = True
     budget: float | None = None
     tolerance: float = 1e-6
+    real_time: bool = False
     compiled: bool = True
     # Built from the options above.
     backup_law: Backup = field(init=False)
@@ -147,9 +151,15 @@ class MPC:
 
     def _built(self) -> FallbackLadder:
         solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
+        program = solver.build(self.ocp)
+        if self.real_time and not (isinstance(program, FeedbackProgram) and program.feeds_back):
+            raise UnsupportedProblem(
+                f"MPC of {self.ocp.name}: {self.solver!r} prepares no real-time iterations; take "
+                "MultipleShooting(backend='native'), or leave real_time out"
+            )
         ladder = FallbackLadder(
             ocp=self.ocp,
-            program=solver.build(self.ocp),
+            program=program,
             least=solver.least_violating(self.ocp) if self.least_violating else None,
             imposed=replace(solver.imposed(self.ocp), sizes=row_sizes(self.ocp)),
             dt=self.dt,
@@ -162,6 +172,7 @@ class MPC:
             budget=inf if self.budget is None else self.budget,
             tolerance=self.tolerance,
             compiled=self.compiled,
+            real_time=self.real_time,
         )
         ladder.prepare()
         return ladder
@@ -190,6 +201,7 @@ class MPC:
             check_positive(self.budget, f"MPC of {name}: budget [s]", finite=False)
         check_not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
         check_flag(self.least_violating, f"MPC of {name}: least_violating")
+        check_flag(self.real_time, f"MPC of {name}: real_time")
 
     def _check_terms(self) -> None:
         """Refuse what has no meaning over a horizon that moves with time."""
@@ -287,6 +299,27 @@ class MPC:
         if not isinstance(report, Decision):
             raise ControlRefused(f"t = {t:g} s: {report.message}", report)
         return report
+
+    def prepare_next(self, *, parameters: Mapping[str, ArrayLike] | None = None) -> bool:
+        """Use the rest of an interval: solve for the state that the model expects at the next step.
+
+        That step then only corrects this plan by what was measured: one real-time iteration, which
+        differs from a solve by second-order terms in the distance of the two states. The ladder
+        judges it like any plan that is not optimal: the model is run under its controls. Where it
+        is not good enough, the step comes at another time or with other parameters, or nothing was
+        prepared, the step solves as always. A rollout (``run``, ``closed_loop``) calls it after
+        every step; who calls ``step`` calls it when the input has been sent.
+
+        Args:
+            parameters: of the horizon of the next step, by name; default: what the controller's
+                own ``parameters`` say.
+
+        Returns:
+            whether the next step is prepared; False without ``real_time``.
+        """
+        if not self.real_time or self.state.solver_raised:
+            return False
+        return self._alone(lambda: self._ladder.prepare_step(self.state, parameters))
 
     def _rebuild(self) -> str:
         """Build the solver again; return why that fails, or nothing."""

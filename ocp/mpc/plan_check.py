@@ -59,6 +59,9 @@ class HorizonParameters(NamedTuple):
 
     def between(self, times: np.ndarray) -> IntervalParameters:
         """Return those at both ends of the intervals between instants (N + 1,) [s]."""
+        if not self.values.entries:
+            none = np.empty((len(times) - 1, 0))
+            return none, none
         return self.values.on((times - self.start) / self.duration)
 
 
@@ -109,7 +112,7 @@ class PlanCheck:
         if plan.status.is_success:
             if not self._is_constrained:
                 return 0.0, ""
-            u = plan_controls(plan, plan.t[:-1])
+            u = plan.u if plan.control_kind == "held" else plan_controls(plan, plan.t[:-1])
             found = self._own_rollout(len(u)).excess(plan.x, u, plan.t, p.between(plan.t))
             return max(found, self._of_rates(plan))
         if plan.status not in _USABLE:

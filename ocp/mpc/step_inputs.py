@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import NamedTuple
 
@@ -72,11 +73,11 @@ class InputCollector:
         self, state: ControllerState, x: ArrayLike, t: float, given: Mapping[str, ArrayLike] | None
     ) -> StepInputs:
         """Check the measurement, get the parameters, and predict the state over the delay."""
-        name, nx = self.ocp.name, self.ocp.model.nx
-        applies_at = check_real(t, f"MPC of {name}: t [s]") + self.delay
-        start = check_numeric(x, f"MPC of {name}: x")
-        if start.shape != (nx,):
-            raise ProblemError(f"MPC of {name}: x has shape {start.shape}, ({nx},) is needed")
+        its_t, its_x, shape = self._arguments
+        applies_at = check_real(t, its_t) + self.delay
+        start = check_numeric(x, its_x)
+        if start.shape != shape:
+            raise ProblemError(f"{its_x} has shape {start.shape}, {shape} is needed")
         p, unknown = self._horizon_parameters(state, applies_at, given)
         missing = missing_measurement(self.ocp, start, state.seen)
         at_effect, seen = p.at(applies_at), None if missing else Seen(float(t), start.copy())
@@ -87,6 +88,26 @@ class InputCollector:
                 start = self._next_state(start, sent, t + k * self.dt, at_effect)
         unsolvable = joined(unknown, missing)
         return StepInputs(float(t), applies_at, start, p, at_effect, not unknown, unsolvable, seen)
+
+    def expected(
+        self, state: ControllerState, given: Mapping[str, ArrayLike] | None
+    ) -> StepInputs | None:
+        """Return the data that the next step will have if the model is right; None: nobody knows.
+
+        Args:
+            state: what is known after a step.
+            given: parameters of the horizon of the next step; None: what the controller's own say.
+        """
+        seen = state.seen
+        if seen is None or not seen.acting:
+            return None
+        t = seen.t + self.dt
+        p, unknown = self._horizon_parameters(state, t + self.delay, given)
+        acting, at_effect = seen.acting, p.at(t + self.delay)
+        start = seen.x
+        for k, sent in enumerate(acting if self.compensate else acting[:1]):
+            start = self._next_state(start, sent, seen.t + k * self.dt, at_effect)
+        return StepInputs(t, t + self.delay, start, p, at_effect, not unknown, unknown, None)
 
     def _expected(
         self, state: ControllerState, measured: np.ndarray, t: float, p: np.ndarray
@@ -124,12 +145,29 @@ class InputCollector:
                 start, known = (state.plan.t[0], state.plan.parameters) if state.plan else (t, None)
                 values = self.ocp.parameter_values({**known, **last} if known else last)
         by_name = values.as_dict() if values.entries else {}
-        return HorizonParameters(values, by_name, start, self.ocp.duration), unknown
+        return HorizonParameters(values, by_name, start, self._duration), unknown
 
     def _last_input(self, state: ControllerState) -> dict[str, np.ndarray]:
         """Return what was applied last, where a rate counts from it; before all as declared."""
-        rates, last = self.ocp.control_rates, state.last_input
-        return {"last_input": last[rates.index]} if len(rates) and last is not None else {}
+        index = self._rated
+        last = state.last_input if index.size else None
+        return {} if last is None else {"last_input": last[index]}
+
+    @cached_property
+    def _rated(self) -> np.ndarray:
+        """Which controls have a rate."""
+        return np.asarray(self.ocp.control_rates.index)
+
+    @cached_property
+    def _arguments(self) -> tuple[str, str, tuple[int]]:
+        """What messages call t and x, and the shape of x."""
+        name = f"MPC of {self.ocp.name}"
+        return f"{name}: t [s]", f"{name}: x", (self.ocp.model.nx,)
+
+    @cached_property
+    def _duration(self) -> float:
+        """Of the horizon [s]."""
+        return self.ocp.duration
 
     def _next_state(self, x: np.ndarray, given: np.ndarray, t: float, p: np.ndarray) -> np.ndarray:
         """Return the model's state one interval after t [s] under an input, parameters held."""

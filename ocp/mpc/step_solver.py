@@ -16,7 +16,7 @@ from ocp.problem.ocp import OCP
 from ocp.problem.scaled import sizes_of
 from ocp.solution.shifted_plan import ShiftedPlan
 from ocp.solution.solution import Solution
-from ocp.solution.solver import InitialGuess, Program
+from ocp.solution.solver import FeedbackProgram, InitialGuess, Program
 from ocp.solution.status import Status
 
 # A plan whose state is further from the measured one, in sizes, is no start for the next.
@@ -32,6 +32,7 @@ class SolvedStep(NamedTuple):
         message: why there is no plan, or it is not optimal.
         raised: whether the solver raised something, and is to be built again.
         rejected: a plan that does not meet the constraints.
+        is_corrected: whether the plan is a prepared one, corrected by the measured state.
     """
 
     plan: Solution | None
@@ -39,6 +40,7 @@ class SolvedStep(NamedTuple):
     message: str
     raised: bool = False
     rejected: Solution | None = None
+    is_corrected: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +51,7 @@ class StepSolver:
         program: the built solver.
         least: finds the plan that violates the constraints least, or None.
         check: the controller's model.
+        real_time: whether a plan that was prepared is corrected, before anything is solved.
     """
 
     ocp: OCP
@@ -57,12 +60,16 @@ class StepSolver:
     check: PlanCheck
     guess: InitialGuess | None
     tolerance: float
+    real_time: bool
 
     def solve(self, inputs: StepInputs, state: ControllerState) -> SolvedStep:
         """Run the solver, and check that its plan meets the constraints."""
         if inputs.unsolvable:
             return SolvedStep(None, None, inputs.unsolvable)
         start, t, p = inputs.start, inputs.applies_at, inputs.parameters
+        corrected = self._corrected(inputs) if self.real_time else None
+        if corrected is not None:
+            return corrected
         guess = self._warm_start(state, start, t)
         try:
             plan = _plan_of(self.program, inputs, guess)
@@ -76,6 +83,37 @@ class StepSolver:
             return SolvedStep(plan, plan.status, "")
         reason = f"{plan.status.name}: {plan.message or plan.status.value}"
         return SolvedStep(plan, plan.status, reason)
+
+    def _corrected(self, inputs: StepInputs) -> SolvedStep | None:
+        """Return the plan that was prepared, corrected by the measured state.
+
+        None where there is none, or the model leaves the constraints under it: a solve decides.
+        """
+        if not isinstance(self.program, FeedbackProgram):
+            return None
+        start, t, p = inputs.start, inputs.applies_at, inputs.parameters
+        try:
+            plan = self.program.feedback(x0=start, t0=t, parameters=p.by_name)
+        except CALLBACK_ERRORS:
+            return None
+        if plan is None or self.check.new_plan(plan, start, t, p)[0] > self.tolerance:
+            return None
+        return SolvedStep(plan, plan.status, plan.message, is_corrected=True)
+
+    def prepare(self, expected: StepInputs, state: ControllerState) -> bool:
+        """Prepare a plan for a step that is expected; return whether there is one."""
+        if expected.unsolvable or not isinstance(self.program, FeedbackProgram):
+            return False
+        start, t = expected.start, expected.applies_at
+        try:
+            return self.program.prepare_feedback(
+                x0=start,
+                t0=t,
+                parameters=expected.parameters.by_name,
+                guess=self._warm_start(state, start, t),
+            )
+        except CALLBACK_ERRORS:
+            return False
 
     def _warm_start(
         self, state: ControllerState, start: np.ndarray, t: float

@@ -92,6 +92,10 @@ class Box(Portable):
         raised = ((ca.fmax(v, a) if np.isfinite(a) else v, b) for v, a, b in rows)
         return ca.vertcat(*(ca.fmin(v, b) if np.isfinite(b) else v for v, b in raised))
 
+    def contains(self, value: np.ndarray) -> bool:
+        """Whether every component lies inside; what is no number does not."""
+        return bool(((value >= self.lower) & (value <= self.upper)).all())
+
     def excess(self, value: np.ndarray) -> np.ndarray:
         """Return by how much each component lies outside: 0 inside, inf where it is no number."""
         outside = np.maximum(

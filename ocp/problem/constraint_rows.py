@@ -218,7 +218,7 @@ class ConstraintRows:
             exempt: where a row does not hold, bool (K, m).
             sizes: what each row is measured in, (m,); None: 1.
         """
-        if not values.size:
+        if not values.size or self.box.contains(values):
             return Violation()
         excess = self.excess(values)
         if exempt is not None:

@@ -19,9 +19,12 @@ def start_violation(ocp: OCP, data: RunData) -> str:
     ignored.
     """
     check_instance(ocp, OCP, "start_violation: the problem")
+    rows = ocp.rows
+    if not rows.path and rows.states.box.contains(data.x0):
+        return ""
     if ocp.start_is_free.all():
         return ""
-    t, rows = np.array([data.t0]), ocp.rows
+    t = np.array([data.t0])
     free = ocp.start_is_free[None, :]
     found = [rows.states.largest_violation(data.x0[None, :], t, exempt=free)]
     if rows.path:

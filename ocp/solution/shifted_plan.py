@@ -24,6 +24,16 @@ class ShiftedPlan(NamedTuple):
     plan: Solution
     t0: float
 
+    @classmethod
+    def of(cls, guess: object) -> "ShiftedPlan | None":
+        """Return a guess as an earlier plan, a solution as one that begins where it did.
+
+        None where it is neither.
+        """
+        if isinstance(guess, Solution):
+            return cls(guess, guess.t.item(0))
+        return guess if isinstance(guess, ShiftedPlan) else None
+
     @property
     def duration(self) -> None:
         """Nothing: the horizon is fixed."""

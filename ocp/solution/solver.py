@@ -66,6 +66,50 @@ class Program(ABC):
         """
 
 
+class FeedbackProgram(Program):
+    """A program that also prepares an answer for a start that is expected, and corrects it at once.
+
+    Its correction is one real-time iteration: the problem linearised, with a quadratic cost, at the
+    answer that was prepared. It differs from the answer of ``run`` by second-order terms in the
+    distance of the start from the expected one. Sources: [Diehl et al. 2005], [Zavala & Biegler
+    2009].
+    """
+
+    @property
+    @abstractmethod
+    def feeds_back(self) -> bool:
+        """Whether it can for this problem with these options."""
+
+    @abstractmethod
+    def prepare_feedback(
+        self,
+        *,
+        x0: ArrayLike,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        guess: InitialGuess | None = None,
+    ) -> bool:
+        """Solve for the expected data, see ``run``, and keep what ``feedback`` needs.
+
+        The next ``run`` forgets it. Return whether there is an answer.
+        """
+
+    @abstractmethod
+    def feedback(
+        self,
+        *,
+        x0: ArrayLike,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Solution | None:
+        """Correct the answer that was prepared for another start, once.
+
+        Returns:
+            a solution with the status ``ITERATION_LIMIT``; None where nothing was prepared for this
+            time and these parameters, or the corrected problem has no solution.
+        """
+
+
 class Solver(Portable, ABC):
     """A method with its options: a frozen dataclass whose fields are typed.
 

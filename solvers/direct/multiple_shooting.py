@@ -1,5 +1,6 @@
 """Direct multiple shooting: the problem on a grid, solved by an interior-point method."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import ClassVar, Literal
@@ -10,7 +11,7 @@ from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Program
 from ocp.internal import (
     BlockingSolver,
     Epigraph,
-    MethodProgram,
+    FeedbackMethodProgram,
     RunData,
     RunResult,
     Transcription,
@@ -23,11 +24,13 @@ from ocp.internal import (
     refuse_compiled,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
-from solvers.direct.nlp_backends import Nlp, NlpBackend
+from solvers.direct.native.warm_run import WarmRun
+from solvers.direct.nlp_backends import NativeNlp, Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
 from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
+from solvers.direct.warm_start import WarmStart
 from solvers.direct.weak_method import weak_method
 
 
@@ -144,7 +147,7 @@ class MultipleShooting(BlockingSolver):
 
 
 @dataclass(frozen=True, eq=False)
-class MultipleShootingProgram(MethodProgram):
+class MultipleShootingProgram(FeedbackMethodProgram):
     """A transcribed problem with its backend.
 
     Attributes:
@@ -158,8 +161,20 @@ class MultipleShootingProgram(MethodProgram):
     grid: ShootingGrid
     nlp: Nlp
 
-    def _solve(self, data: RunData, guess: InitialGuess | None) -> RunResult:
-        """Solve for these data, in the phases of ``NlpRun``."""
+    def _begun(
+        self, data: RunData, guess: InitialGuess | None
+    ) -> RunResult | Callable[[], RunResult]:
+        """Solve from an earlier plan, or return what solves; see ``WarmRun``."""
+        self.forget_feedback()
+        warm = self._warm_run(data, guess) if self._warm_run and guess else None
+        if isinstance(warm, RunResult):
+            return warm
+        return partial(self._solve, data, guess, warm)
+
+    def _solve(
+        self, data: RunData, guess: InitialGuess | None, warm: WarmStart | None = None
+    ) -> RunResult:
+        """Solve for these data, in the phases of ``NlpRun``; go on after a warm run, if any."""
         ocp, duration = self.ocp, first_duration(self.ocp, guess)
 
         def first(duration: float, source: FirstStates) -> np.ndarray:
@@ -167,7 +182,7 @@ class MultipleShootingProgram(MethodProgram):
 
         others = partial(other_starts, ocp, guess, duration, first)
         w0 = first(duration, "tame")
-        outcome = self._nlp_run.solve(w0, data, others, self._costate(guess))
+        outcome = self._nlp_run.solve(w0, data, others, warm or self._warm_start(guess))
         if outcome.is_undefined and not self.transcription.start_is_smooth(w0, data):
             outcome = self._nlp_run_without_slope.solve(w0, data, others).after(outcome)
             return self._result(data, outcome, self._without_slope)
@@ -197,6 +212,24 @@ class MultipleShootingProgram(MethodProgram):
         nlp = backend.build(self._without_slope)
         return replace(self._nlp_run, transcription=self._without_slope, nlp=nlp)
 
+    # -- real-time iterations ----------------------------------------------------------------
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether the backend is the native one, and start and final time are given."""
+        return self._warm_run is not None
+
+    def _freeze(self, data: RunData, guess: InitialGuess | None) -> bool:
+        return bool(self._warm_run and guess and self._warm_run.freeze(data, guess))
+
+    def _fed_back(self, data: RunData) -> RunResult | None:
+        return self._warm_run.fed_back(data) if self._warm_run else None
+
+    @property
+    def seconds_in_c(self) -> float | None:
+        """What the native backend's last run took, by its own clock [s]; None of other backends."""
+        return self.nlp.run.library.report().seconds if isinstance(self.nlp, NativeNlp) else None
+
     # -- the first iterate -------------------------------------------------------------------
 
     def first_iterate(
@@ -213,13 +246,23 @@ class MultipleShootingProgram(MethodProgram):
         u = u if blocks is None else blocks.holding(u)
         return self.transcription.with_time(x, duration), u
 
-    def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
-        """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""
+    def _warm_start(self, guess: InitialGuess | None) -> WarmStart | None:
+        """Return the costates of a guess with states, for a backend that uses them."""
         nx, start = self.ocp.model.nx, np.zeros(1)
         if self.solver.backend != "native" or guess is None:
             return None
         costate = guess.sample("costate", self.grid.fractions, nx)
-        return None if costate is None or guess.sample("x", start, nx) is None else costate
+        if costate is None or guess.sample("x", start, nx) is None:
+            return None
+        return WarmStart(costate)
+
+    @cached_property
+    def _warm_run(self) -> WarmRun | None:
+        """Runs from an earlier plan, for the native backend; None: all are ``NlpRun``'s."""
+        is_given = not (self.ocp.has_free_start or self.ocp.has_free_time)
+        if not (isinstance(self.nlp, NativeNlp) and is_given):
+            return None
+        return WarmRun(self.nlp.run, self.solver.accuracy)
 
     # -- the result ---------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ from solvers.direct.subprocess_function import (
     SubprocessLost,
 )
 from solvers.direct.transcribed_problem import TranscribedProblem
+from solvers.direct.warm_start import WarmStart
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class Nlp(Protocol):
         w0: np.ndarray,
         p: np.ndarray,
         bounds: Bounds,
-        costate: np.ndarray | None = None,
+        warm: WarmStart | None = None,
     ) -> NlpResult:
         """Run the backend; return the first iterate where its result is not finite.
 
@@ -162,7 +163,7 @@ class Nlp(Protocol):
             w0: first iterate.
             p: data of the problem.
             bounds: lbx, ubx, lbg, ubg.
-            costate: of the first iterate, (N + 1, nx), where something is known of it.
+            warm: what is known of the first iterate beside.
         """
         ...
 
@@ -202,9 +203,9 @@ class CasadiNlp:
         w0: np.ndarray,
         p: np.ndarray,
         bounds: Bounds,
-        costate: np.ndarray | None = None,
+        warm: WarmStart | None = None,
     ) -> NlpResult:
-        """Run the backend, see ``Nlp``; costates are of no use to it."""
+        """Run the backend, see ``Nlp``; it starts cold."""
         inputs = {"x0": w0, "p": p, **bounds}
         try:
             raw, stats = self.subprocess(inputs) if self.subprocess else self._here(inputs)
@@ -269,10 +270,10 @@ class NativeNlp:
         w0: np.ndarray,
         p: np.ndarray,
         bounds: Bounds,
-        costate: np.ndarray | None = None,
+        warm: WarmStart | None = None,
     ) -> NlpResult:
         """Run the solver, see ``Nlp``."""
-        return self.run(w0, p, bounds, costate)
+        return self.run(w0, p, bounds, warm)
 
     def optimality(self, result: NlpResult, p: np.ndarray, bounds: Bounds) -> OptimalityResidual:
         """Return its own residual: it is not scaled."""

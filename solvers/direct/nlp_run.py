@@ -23,6 +23,7 @@ from solvers.direct.nlp_result import NlpResult
 from solvers.direct.nlp_verdict import NlpInputs, NlpVerdict
 from solvers.direct.transcribed_problem import TranscribedProblem
 from solvers.direct.unmoved_controls import at_bounds, perturbed, unmoved
+from solvers.direct.warm_start import WarmStart
 
 # What is said of an answer of IPOPT where the native solver was asked.
 _HANDED_OVER = "by IPOPT, since the native solver found no step or no end"
@@ -75,7 +76,7 @@ class NlpRun:
         w0: np.ndarray,
         data: RunData,
         others: Callable[[], Iterable[OtherStart]] = tuple,
-        costate: np.ndarray | None = None,
+        warm: WarmStart | None = None,
     ) -> NlpOutcome:
         """Solve for these data from a first iterate, which is clipped to the bounds.
 
@@ -83,9 +84,9 @@ class NlpRun:
             w0: first iterate.
             data: of the run.
             others: returns first iterates to try before a failure is reported.
-            costate: of the first iterate, (N + 1, nx), where something is known of it.
+            warm: what is known of the first iterate beside.
         """
-        started, inputs = perf_counter(), replace(self._inputs(w0, data), costate=costate)
+        started, inputs = perf_counter(), replace(self._inputs(w0, data), warm=warm)
         outcome = self._run_to_an_optimum(inputs)
         if self._may_be_infeasible(outcome):
             outcome = self.restore_feasibility(inputs, outcome)
@@ -311,8 +312,8 @@ class NlpRun:
 
     def _run(self, nlp: Nlp, inputs: NlpInputs, w: np.ndarray) -> NlpOutcome:
         """Run a backend from an iterate."""
-        costate = inputs.costate if w is inputs.w0 else None
-        result = nlp.solve(w, inputs.p, inputs.bounds, costate)
+        warm = inputs.warm if w is inputs.w0 else None
+        result = nlp.solve(w, inputs.p, inputs.bounds, warm)
         verdict = self._verdict if nlp is self.nlp else replace(self._verdict, nlp=nlp)
         judged = verdict.judge(inputs, result)
         outcome = NlpOutcome((judged.result,), judged.status, judged.message)

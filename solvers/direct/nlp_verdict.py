@@ -12,13 +12,14 @@ from solvers.direct.nlp_backends import Nlp
 from solvers.direct.nlp_result import NlpResult
 from solvers.direct.return_words import ACCEPTABLE, meaning
 from solvers.direct.transcribed_problem import TranscribedProblem
+from solvers.direct.warm_start import WarmStart
 
 # Constraint violations above this count, also if the backend accepts them after scaling.
-_VIOLATED = 1e-6
+VIOLATED = 1e-6
 # Where a backend has not met its tolerance, residuals below this are accepted, and reported.
 _ACCEPTABLE = 5e-4
 # A success with a residual above this was one only after the backend's scaling.
-_NOT_STATIONARY = 1e-4
+NOT_STATIONARY = 1e-4
 # Unknowns beyond this have diverged.
 _DIVERGED = 1e15
 
@@ -32,14 +33,14 @@ class NlpInputs:
         p: data of the program.
         bounds: lbx, ubx, lbg, ubg.
         data: as given.
-        costate: of the first iterate, (N + 1, nx), where something is known of it.
+        warm: what is known of the first iterate beside; None: nothing.
     """
 
     w0: np.ndarray
     p: np.ndarray
     bounds: dict[str, np.ndarray]
     data: RunData
-    costate: np.ndarray | None = None
+    warm: WarmStart | None = None
 
 
 class JudgedResult(NamedTuple):
@@ -82,13 +83,13 @@ class NlpVerdict:
         if result.is_undefined:  # cost and constraints may be those of no iterate at all
             return JudgedResult(result, *self._judge_failure(result, ""))
         violation, row = self.transcription.worst(result.w, result.g, inputs.bounds)
-        if violation > _VIOLATED:
+        if violation > VIOLATED:
             where = self.where(result, inputs.data, violation, row)
             return JudgedResult(result, *self._judge_failure(result, where))
         if not result.success or result.return_status == ACCEPTABLE:
             return self._judge_unfinished(inputs, result)
         residual = self.nlp.optimality(result, inputs.p, inputs.bounds)
-        if residual.is_stationary(_NOT_STATIONARY):
+        if residual.is_stationary(NOT_STATIONARY):
             return JudgedResult(result, *self._judge_solution(inputs, result, ""))
         said = f"{residual.gradient:.2g}, with multipliers up to {residual.multiplier:.2g}"
         message = f"no optimum: the gradient of the Lagrangian is {said}"

@@ -145,6 +145,7 @@ def test_functions_have_the_sizes_that_the_core_reads(make) -> None:
         "stage_value": nx + 1 + nc,
         "stage_slope": nx + 1 + nc + nx * nw + nw + nc * nw,
         "stage_full": nx + 1 + nc + nx * nw + nw + nc * nw + nw * nw,
+        "stage_half": nx,
         "start_value": ni,
         "start_full": ni + ni * nw + nw * nw,
         "end_value": 1 + ne,

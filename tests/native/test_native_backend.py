@@ -219,9 +219,22 @@ def test_a_mistake_in_any_function_and_lane_is_noticed(order: int) -> None:
                 touched[place] += 1.0
             return cost
 
-        found = native_library.first_difference(library.code, library.arrays, wrong)
+        code, at = library.code, library.arrays
+        found = native_library.first_difference(code, at, wrong, library.account)
         assert found is not None
         assert found.endswith(f"at order {order}")
+
+
+def test_a_mistake_in_a_half_step_is_noticed() -> None:
+    library = NativeLibrary.of(StageCode(Transcription(swing(), 6, NATIVE.integrator)))
+
+    def wrong() -> None:
+        library.account()
+        library.arrays.half_step[5] += 1.0
+
+    given = library.code, library.arrays, library.evaluate
+    assert native_library.first_difference(*given, library.account) is None
+    assert native_library.first_difference(*given, wrong) == "the half step"
 
 
 def test_a_library_that_cannot_be_loaded_is_a_named_error(

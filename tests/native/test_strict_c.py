@@ -24,7 +24,7 @@ _MAIN = """
 #include <stdlib.h>
 int main(void) {
   char *block = aligned_alloc(64, (native_bytes(INTERVALS) + 63) / 64 * 64);
-  double *arrays[25];
+  double *arrays[31];
   native_set_up(block, INTERVALS);
   native_arrays(block, arrays);
   memcpy(arrays[0], x, sizeof x);
@@ -34,8 +34,8 @@ int main(void) {
   memcpy(arrays[5], up, sizeof up);
   memcpy(arrays[10], x_given, sizeof x_given);
   native_read_bounds(block);
-  const Options options = {1e-9, 0.1, 300.0, INFINITY, INFINITY, 0.0, 0.0};
-  double report[12];
+  const Options options = {1e-9, 0.1, 300.0, INFINITY, INFINITY, 0.0, 0.0, 0.0};
+  double report[13];
   const int ending = native_solve(block, &options, 1);
   native_report(block, report);
   printf("%d %.12e", ending, report[0]);

@@ -10,10 +10,15 @@ from solvers.direct.native.stage_code import StageCode
 
 # By how much compiled numbers may differ, relative to 1 + abs(value).
 _SAME = 1e-6
+# A state that is moved further by one interval has exploded.
+_TAME = 1e3
 
 
 def first_difference(
-    code: StageCode, at: NativeArrays, evaluate: Callable[[int], float]
+    code: StageCode,
+    at: NativeArrays,
+    evaluate: Callable[[int], float],
+    account: Callable[[], object],
 ) -> str | None:
     """Return what differs first, at a random point of every node, and so of every lane; None: none.
 
@@ -21,6 +26,7 @@ def first_difference(
         code: what was compiled.
         at: its memory, which is written to.
         evaluate: evaluates up to derivatives of an order, and returns the cost.
+        account: says what the iterate is worth, half steps among it.
     """
     rng = np.random.default_rng(0)
     for array in (at.x, at.u, at.data, at.costate, at.y):
@@ -34,7 +40,11 @@ def first_difference(
         for name, found in {"cost": cost, **made}.items():
             if not _is_same(found, known[name]):
                 return f"{name}, at order {order}"
-    return None
+    at.sizes[:], at.half_step[:] = 1.0, np.nan
+    account()
+    # At a random point some stages explode, and twice as many steps on the way keep no digit.
+    tame = np.where(np.abs(known["half_step"]) < _TAME, known["half_step"], np.nan)
+    return None if _is_same(at.half_step, tame) else "the half step"
 
 
 def _is_same(found: np.ndarray, right: np.ndarray) -> bool:
@@ -49,7 +59,7 @@ def _known(code: StageCode, at: NativeArrays) -> dict[str, np.ndarray]:
     n, nb = code.transcription.n, len(code.bounded)
     known = {
         name: np.zeros(getattr(at, name).shape)
-        for name in ("gap", "v", "slope", "gradient", "hessian", "c_slope")
+        for name in ("gap", "v", "slope", "gradient", "hessian", "c_slope", "half_step")
     }
     known["cost"] = np.zeros(1)
     flat, row = 0, 0
@@ -69,6 +79,7 @@ def _known(code: StageCode, at: NativeArrays) -> dict[str, np.ndarray]:
             if "next" in each:
                 known["gap"][k] = each["next"] - at.x[k + 1]
                 known["slope"][k] = each["slope"]
+                known["half_step"][k] = each["half_step"] - at.x[k + 1]
     return known
 
 
@@ -84,7 +95,8 @@ def _functions(
         return
     given = [x, at.u[k], d, at.costate[k + 1], at.y[flat : flat + nc]]
     names = ("next", "cost", "rows", "slope", "gradient", "c_slope", "hessian")
-    yield _named(names, full["stage_full"].call(given))
+    half_step = np.ravel(np.array(full["stage_half"](x, at.u[k], d)))
+    yield _named(names, full["stage_full"].call(given)) | {"half_step": half_step}
     if k == 0:
         numbers = full["start_full"].call([x, d, at.y[flat + nc : flat + nc + ni]])
         yield _named(("rows", "c_slope", "hessian"), numbers)

@@ -33,3 +33,9 @@ class NativeArrays(NamedTuple):
     dx: np.ndarray
     du: np.ndarray
     dcostate: np.ndarray
+    sizes: np.ndarray
+    plan_t: np.ndarray
+    plan_x: np.ndarray
+    plan_u: np.ndarray
+    plan_costate: np.ndarray
+    half_step: np.ndarray

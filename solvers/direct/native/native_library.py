@@ -14,7 +14,7 @@ from solvers.direct.native.native_arrays import NativeArrays
 from solvers.direct.native.stage_code import StageCode
 
 _LINE = 64  # bytes that memory is aligned to
-_REPORT = 12  # numbers of ``native_report``
+_REPORT = 13  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
 _NOTED = 512  # iterations of which something is noted
 #: What is noted of an iteration.
@@ -37,6 +37,7 @@ class NativeReport(NamedTuple):
         is_monotone: whether the barrier parameter has become so.
         shift: of the last Hessian.
         barrier: the last barrier parameter.
+        seconds: of the solve, by the clock of the library [s].
     """
 
     cost: float
@@ -51,6 +52,26 @@ class NativeReport(NamedTuple):
     is_monotone: float
     shift: float
     barrier: float
+    seconds: float
+
+
+class NativeAccount(ctypes.Structure):
+    """``Account`` of ``account.h``: what an answer is worth, beside its optimality.
+
+    Attributes:
+        moved: by how much half the integration step moves a state, relative to size + abs(x).
+        node: where.
+        unmoved: number of controls that are those of the first iterate all along.
+    """
+
+    moved: float
+    node: float
+    unmoved: float
+    _fields_ = (
+        ("moved", ctypes.c_double),
+        ("node", ctypes.c_double),
+        ("unmoved", ctypes.c_double),
+    )
 
 
 class NativeOptions(ctypes.Structure):
@@ -64,6 +85,7 @@ class NativeOptions(ctypes.Structure):
         ("pause", ctypes.c_double),
         ("warm", ctypes.c_double),
         ("monotone", ctypes.c_double),
+        ("frozen", ctypes.c_double),
     )
 
 
@@ -107,8 +129,9 @@ class NativeLibrary:
         library.native_evaluate.restype = ctypes.c_double
         library.native_evaluate.argtypes = [ctypes.c_void_p, ctypes.c_int]
         library.native_linear_step.argtypes = [ctypes.c_void_p, ctypes.c_double]
+        library.native_shift.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
         loaded = cls(code, library)
-        if wrong := first_difference(code, loaded.arrays, loaded.evaluate):
+        if wrong := first_difference(code, loaded.arrays, loaded.evaluate, loaded.account):
             raise UnsupportedProblem(
                 f"{name}: the compiled stage gives other numbers than CasADi ({wrong}): "
                 "the compiler is at fault; take backend='ipopt'"
@@ -119,6 +142,25 @@ class NativeLibrary:
     def _clear(self) -> None:
         """Lay the memory out again."""
         self.library.native_set_up(self._block, self.code.transcription.n)
+        self.arrays.sizes[:] = self.code.sizes
+
+    def shift(self, t0: float, duration: float) -> None:
+        """Write the plan in ``plan_t``, ..., moved to begin at t0 [s], into the iterate."""
+        self.library.native_shift(self._block, t0, duration)
+
+    def begin(self) -> None:
+        """Move the iterate into its bounds, and keep it for ``account``."""
+        self.library.native_begin(self._block)
+
+    def account(self) -> NativeAccount:
+        """Move the answer into its bounds, with the costate of a given start; say its worth."""
+        account = NativeAccount()
+        self.library.native_account(self._block, ctypes.byref(account))
+        return account
+
+    def freeze(self) -> None:
+        """Freeze the program at the answer of the last solve, see ``frozen.h``."""
+        self.library.native_freeze(self._block)
 
     def solve(self, options: NativeOptions) -> int:
         """Solve from what is in the arrays; return how it ended, an ``Ending``.
@@ -137,15 +179,13 @@ class NativeLibrary:
 
     def report(self) -> NativeReport:
         """Return what the last solve has come to."""
-        numbers = (ctypes.c_double * _REPORT)()
-        self.library.native_report(self._block, numbers)
-        return NativeReport(*numbers)
+        self.library.native_report(self._block, self._numbers)
+        return NativeReport(*self._numbers)
 
     def notes(self) -> np.ndarray:
         """Return what is noted of the iterations, one row each, in the order of ``Note``."""
-        notes = np.empty((_NOTED, len(NOTE)))
-        pointer = notes.ctypes.data_as(ctypes.c_void_p)
-        return notes[: self.library.native_notes(self._block, pointer)]
+        memory, notes = self._notes
+        return notes[: self.library.native_notes(self._block, memory)].copy()
 
     def lagrangian_gradient(self) -> np.ndarray:
         """Return what multipliers of given unknowns balance, (N + 1, nu + nx) in (u, x)."""
@@ -166,6 +206,17 @@ class NativeLibrary:
         return np.zeros(self.library.native_bytes(n) + _LINE, dtype=np.uint8)
 
     @cached_property
+    def _numbers(self) -> "ctypes.Array[ctypes.c_double]":
+        """Where a report is written."""
+        return (ctypes.c_double * _REPORT)()
+
+    @cached_property
+    def _notes(self) -> tuple[ctypes.c_void_p, np.ndarray]:
+        """Where notes are written, and as an array."""
+        notes = np.empty((_NOTED, len(NOTE)))
+        return ctypes.c_void_p(notes.ctypes.data), notes
+
+    @cached_property
     def _block(self) -> ctypes.c_void_p:
         """The memory, laid out."""
         address = self._memory.ctypes.data
@@ -181,10 +232,12 @@ class NativeLibrary:
         nw, total = nx + nu, code.row_total
         states, controls, nodes = (m, nx), (m - 1, nu), (m, nw)
         shapes = {name: (rows,) for name in NativeArrays._fields}
-        shapes |= dict.fromkeys(("x", "costate", "dx", "dcostate"), states)
-        shapes |= dict.fromkeys(("u", "u_given", "du"), controls)
+        states_of = ("x", "costate", "dx", "dcostate", "plan_x", "plan_costate")
+        shapes |= dict.fromkeys(states_of, states)
+        shapes |= dict.fromkeys(("u", "u_given", "du", "plan_u"), controls)
         shapes |= dict.fromkeys(("gradient", "rhs"), nodes)
         shapes |= {"data": (m, code.nd), "x_given": (nx,), "gap": (m - 1, nx)}
+        shapes |= {"sizes": (nx,), "plan_t": (m,), "half_step": (m - 1, nx)}
         shapes |= {"slope": (m - 1, nx, nw), "hessian": (m, nw, nw), "c_slope": (total, nw)}
         pointers = (ctypes.POINTER(ctypes.c_double) * len(shapes))()
         self.library.native_arrays(self._block, pointers)

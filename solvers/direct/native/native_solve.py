@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from ocp.internal import RunData
 from solvers.direct.native.flat_rows import FlatRows
 from solvers.direct.native.native_library import NOTE, NativeLibrary, NativeOptions, NativeReport
 from solvers.direct.nlp_result import NlpResult
+from solvers.direct.warm_start import WarmStart
 
 # First barrier parameter, and that of a start with costates.
 _COLD, _WARM = 0.1, 1e-4
+# Those of a program frozen at an answer, from the multipliers of that, one after the other where no
+# step is found: further from it bounds may be active that were not.
+_FROZEN = (1e-6, 1e-3, 1e-1)
 # How long a solve may take before Python looks for signals [s].
 _PAUSE = 0.1
 # What ``Ending`` of ``workspace.h`` means, in words that ``return_words`` explains.
@@ -64,7 +69,16 @@ class NativeLimits:
             pause=_PAUSE,
             warm=float(warm),
             monotone=float(monotone),
+            frozen=0.0,
         )
+
+    @property
+    def of_frozen(self) -> tuple[NativeOptions, ...]:
+        """Those of a frozen program, see ``frozen.h``, to be tried in this order."""
+        options = [self.options(_Way.WARM, 0, 0.0) for _ in _FROZEN]
+        for each, barrier in zip(options, _FROZEN, strict=True):
+            each.barrier, each.frozen = barrier, 1.0
+        return tuple(options)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +98,7 @@ class NativeSolve:
         w0: np.ndarray,
         p: np.ndarray,
         bounds: dict[str, np.ndarray],
-        costate: np.ndarray | None,
+        warm: WarmStart | None,
     ) -> NlpResult:
         """Run it, in ways that follow each other; return the best of their results.
 
@@ -94,26 +108,21 @@ class NativeSolve:
             w0: first iterate.
             p: data of the problem, see ``Transcription.data_vector``.
             bounds: lbx, ubx, lbg, ubg.
-            costate: of the first iterate, (N + 1, nx); None: it is a cold start.
+            warm: what is known of the first iterate; None: it is a cold start.
         """
-        library, at, tr = self.library, self.library.arrays, self.library.code.transcription
+        library, at = self.library, self.library.arrays
         at.data[:] = library.code.data(p)
-        self._rows.put_bounds(at, bounds)
-        library.read_bounds()
+        self.put_bounds(bounds)
         has_sides = bool(at.has_low.any() or at.has_up.any())
-        skipped = {_Way.WARM: costate is None, _Way.MONOTONE: not has_sides}
+        skipped = {_Way.WARM: warm is None, _Way.MONOTONE: not has_sides}
         stats: dict[str, Any] = {}
         best: NlpResult | None = None
-        started = perf_counter()
+        started = perf_counter() - (warm.seconds if warm else 0.0)
         for way in _Way:
             if skipped.get(way) or (best and self._is_used_up(stats, perf_counter() - started)):
                 continue
-            at.x[:], at.u[:] = tr.split(w0)
-            at.costate[:] = 0.0
-            if way is _Way.WARM and costate is not None:
-                at.costate[:, : costate.shape[1]] = costate
             used = stats.get("iter_count", 0), perf_counter() - started
-            ending = ENDINGS[library.solve(self.limits.options(way, *used))]
+            ending = ENDINGS[self._ended(way, w0, warm, self.limits.options(way, *used))]
             stats = _stats(ending, library.report(), library.notes(), stats)
             found = self._result(bounds, stats)
             if best is None or _remainder(found) < _remainder(best):
@@ -125,6 +134,37 @@ class NativeSolve:
         if not best.is_finite:
             return NlpResult.without_iterate(w0, len(bounds["lbg"]), stats)
         return replace(best, stats=stats)
+
+    def _ended(
+        self, way: _Way, w0: np.ndarray, warm: WarmStart | None, options: NativeOptions
+    ) -> int:
+        """Iterate in one way from the first iterate; return how it has ended."""
+        at = self.library.arrays
+        if way is _Way.WARM and warm and warm.ending is not None:
+            return warm.ending
+        at.x[:], at.u[:] = self.library.code.transcription.split(w0)
+        at.costate[:] = 0.0
+        if way is _Way.WARM and warm and warm.costate is not None:
+            at.costate[:, : warm.costate.shape[1]] = warm.costate
+        return self.library.solve(options)
+
+    def put_data(self, data: RunData) -> None:
+        """Write times and parameters of a run."""
+        code, at = self.library.code, self.library.arrays
+        if code.has_parameters:
+            at.data[:] = code.data(code.transcription.data_vector(data))
+        else:
+            at.data[:, 0], at.data[:, 1:] = data.t0, code.grid
+
+    def put_bounds(self, bounds: dict[str, np.ndarray]) -> None:
+        """Write bounds of all unknowns and rows: lbx, ubx, lbg, ubg."""
+        self._rows.put_bounds(self.library.arrays, bounds)
+        self.library.read_bounds()
+
+    @cached_property
+    def warm_options(self) -> NativeOptions:
+        """Those of a run from costates, by itself."""
+        return self.limits.options(_Way.WARM, 0, 0.0)
 
     def _is_used_up(self, stats: dict[str, Any], seconds: float) -> bool:
         """Whether neither time nor iterations are left for another way."""

@@ -1,6 +1,6 @@
 """The C code of the native solver for one problem: its sizes and the functions of its nodes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -9,12 +9,30 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Integrator
-from ocp.internal import Stage, StageInputs, StageTape, Transcription, node_widths
+from ocp.internal import (
+    Stage,
+    StageInputs,
+    StageTape,
+    Transcription,
+    node_widths,
+    sizes_of,
+)
 from solvers.direct.native.lane_code import lane_code
 
 _CORE = Path(__file__).with_name("core")
 # In the order in which the compiler reads them.
-_FILES = ("workspace", "evaluate", "riccati", "barrier", "line_search", "solve", "entry")
+_FILES = (
+    "workspace",
+    "evaluate",
+    "frozen",
+    "riccati",
+    "barrier",
+    "line_search",
+    "solve",
+    "warm_start",
+    "account",
+    "entry",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +88,28 @@ class StageCode:
         time = [self.nu + ocp.model.nx] if ocp.has_free_time else []
         return (*np.flatnonzero(has).tolist(), *time)
 
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Of the states of a node, (nx,), which the accuracy of the integration is relative to."""
+        time = [1.0] * (self.nx - self.transcription.ocp.model.nx)
+        return np.append(sizes_of(self.transcription.ocp).x, time)
+
     # -- the functions of a node -------------------------------------------------------------
 
     @cached_property
     def functions(self) -> tuple[ca.Function, ...]:
         """Values, and values with derivatives: of a stage, of the start, of the end."""
-        return (*self._stage(), *self._start(), *self._end())
+        return (*self._stage(), self._half_step(), *self._start(), *self._end())
+
+    def _half_step(self) -> ca.Function:
+        """The next state with half the integration step; a discrete model has no other one."""
+        tr, ocp, s = self.transcription, self.transcription.ocp, self._symbols
+        finer = replace(tr.integrator, steps=2 * tr.integrator.steps)
+        integrator = tr.integrator if ocp.model.is_discrete else finer
+        given = [s.state, s.u, self._time, self._duration * s.width, s.left, s.right]
+        after, _ = Stage.of(ocp, integrator, held=True).step.call(given)
+        final_time = [s.x[ocp.model.nx]] if ocp.has_free_time else []
+        return _function("stage_half", [s.x, s.u, s.d], [ca.vertcat(after, *final_time)])
 
     def _stage(self) -> tuple[ca.Function, ...]:
         tr, ocp, s = self.transcription, self.transcription.ocp, self._symbols
@@ -184,15 +218,20 @@ class StageCode:
         """Return the data of all nodes, (N + 1, nd), of those of the program, ``data_vector``."""
         n, n_p = self.transcription.n, (self.nd - 3) // 2
         result, half = np.empty((n + 1, self.nd)), 3 + n_p
-        result[:, 0], result[:, 1:3] = p[0], self._grid
+        result[:, 0], result[:, 1:3] = p[0], self.grid
         if n_p:
             left, right = p[1:].reshape(-1, n_p)[:n], p[1:].reshape(-1, n_p)[n : 2 * n]
             result[:n, 3:half], result[:n, half:] = left, right
             result[n, 3:half] = result[n, half:] = p[1:].reshape(-1, n_p)[2 * n]
         return result
 
+    @property
+    def has_parameters(self) -> bool:
+        """Whether the data of a node are more than its times."""
+        return self.nd > 3
+
     @cached_property
-    def _grid(self) -> np.ndarray:
+    def grid(self) -> np.ndarray:
         """Nodes and widths of the intervals after them as fractions of the horizon, (N + 1, 2)."""
         nodes = self.transcription.fractions
         return np.column_stack([nodes, np.append(node_widths(nodes), 0.0)])

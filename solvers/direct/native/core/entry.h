@@ -20,7 +20,8 @@ void native_arrays(char *block, double **arrays) {
                    s->v,      s->z_low, s->z_up,    s->y,           s->x_given, s->u_given,
                    s->has_low, s->has_up, s->is_equation, s->gap,   s->slope,   s->gradient,
                    s->hessian, s->c_slope, s->sigma, s->rhs,        s->dx,      s->du,
-                   s->dlambda};
+                   s->dlambda, s->sizes,  s->plan_t, s->plan_x,     s->plan_u,  s->plan_lambda,
+                   s->half_step};
   memcpy(arrays, all, sizeof all);
 }
 
@@ -51,9 +52,42 @@ void native_read_bounds(char *block) {
   }
 }
 
+/* Write the plan, moved to begin at t0 [s], into x, u and lambda. */
+void native_shift(char *block, double t0, double duration) {
+  shift_plan((Workspace *)block, t0, duration);
+}
+
+/* Move x and u into their bounds, and keep u, for native_account(). */
+void native_begin(char *block) {
+  Workspace *s = (Workspace *)block;
+  clip_to_bounds(s);
+  memcpy(s->u_first, s->u, sizeof(double) * (size_t)s->n * NU);
+}
+
+/* Say what the answer is worth; move it into its bounds, which it may leave by the tolerance, and
+ * write the costate of a given start. */
+void native_account(char *block, Account *account) {
+  Workspace *s = (Workspace *)block;
+  clip_to_bounds(s);
+  costate_of_start(s);
+  account->moved = half_step_error(s, &account->node);
+  account->unmoved = unmoved_controls(s);
+}
+
 /* Solve from the iterate in x, u and lambda; begin = 0: go on after PAUSED. */
 int native_solve(char *block, const Options *options, int begin) {
-  return iterate((Workspace *)block, options, begin);
+  Workspace *s = (Workspace *)block;
+  const Ending ending = iterate(s, options, begin);
+  s->is_frozen = 0;
+  return ending;
+}
+
+/* Freeze the program at the answer of a solve, for native_solve() with the option and another start
+ * in x. */
+void native_freeze(char *block) {
+  Workspace *s = (Workspace *)block;
+  evaluate_at_iterate(s, 1);
+  freeze(s);
 }
 
 /* What a solve has come to. */
@@ -61,7 +95,8 @@ void native_report(const char *block, double *report) {
   const Workspace *s = (const Workspace *)block;
   const double all[] = {s->cost,           s->left.dual,      s->left.primal, s->left.product,
                         s->left.multiplier, s->iteration,     s->factorisations, s->evaluations,
-                        s->values,         s->is_monotone,    s->shift,       s->mu};
+                        s->values,         s->is_monotone,    s->shift,       s->mu,
+                        s->seconds};
   memcpy(report, all, sizeof all);
 }
 

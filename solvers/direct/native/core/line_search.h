@@ -71,7 +71,7 @@ static void filter_add(Workspace *s, double theta, double phi) {
 static double evaluate_trial(Workspace *s, double a) {
   for (int i = 0; i < (s->n + 1) * NX; i++) s->x_trial[i] = s->x[i] + a * s->dx[i];
   for (int i = 0; i < s->n * NU; i++) s->u_trial[i] = s->u[i] + a * s->du[i];
-  return evaluate_values(s, s->x_trial, s->u_trial, s->gap_trial, s->v_trial);
+  return values_of_program(s, s->x_trial, s->u_trial, s->gap_trial, s->v_trial);
 }
 
 /* Return an accepted share of the step, at most `longest` and at least `shortest`, or 0. */

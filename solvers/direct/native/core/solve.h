@@ -106,6 +106,30 @@ static void start_barrier(Workspace *s, double mu, int warm) {
   evaluate_at_iterate(s, 1);
 }
 
+/* Slack and multiplier of one side as an earlier solve has left them, but not closer to 0 than a
+ * barrier parameter; active or not as the larger of the two says. */
+static void keep_side(double mu, double *slack, double *multiplier) {
+  if (*multiplier > *slack) {
+    *multiplier = fmax(*multiplier, sqrt(mu));
+    *slack = mu / *multiplier;
+  } else {
+    *slack = fmax(*slack, sqrt(mu));
+    *multiplier = mu / *slack;
+  }
+}
+
+/* Begin the frozen program where it was frozen, with the multipliers that were found there. */
+static void start_frozen(Workspace *s, double mu) {
+  go_back(s);
+  for (int i = 0; i < s->rows; i++) {
+    s->ds_low[i] = s->ds_up[i] = s->dz_low[i] = s->dz_up[i] = 0.0;
+    s->corr_low[i] = s->corr_up[i] = 0.0;
+    if (s->has_low[i] != 0.0) keep_side(mu, &s->s_low[i], &s->z_low[i]);
+    if (s->has_up[i] != 0.0) keep_side(mu, &s->s_up[i], &s->z_up[i]);
+  }
+  evaluate_program(s, 1);
+}
+
 /* Take a share of the step in x, u, lambda, y and slacks, and another one in z. */
 static void accept(Workspace *s, double primal, double dual) {
   for (int i = 0; i < (s->n + 1) * NX; i++) {
@@ -222,6 +246,7 @@ static void note(Workspace *s) {
 static Ending iterate(Workspace *s, const Options *o, int begin) {
   const double started = clock_seconds(), before = begin ? 0.0 : s->seconds;
   const double floor = FLOOR * o->tolerance;
+  s->is_frozen = o->frozen != 0.0;
   if (begin) {
     const int warm = o->warm != 0.0;
     s->mu = o->barrier;
@@ -229,11 +254,15 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     s->iteration = s->is_monotone = s->filter_size = 0;
     s->factorisations = s->evaluations = s->values = 0;
     s->length = 1.0;
+    s->seconds = 0.0;
     s->best = INFINITY;
     s->since_best = 0;
     if (o->monotone != 0.0) s->is_monotone = 1;
     if (!warm) memset(s->lambda, 0, sizeof(double) * (size_t)(s->n + 1) * NX);
-    start_barrier(s, s->mu, warm);
+    if (s->is_frozen)
+      start_frozen(s, s->mu);
+    else
+      start_barrier(s, s->mu, warm);
   }
   for (;;) {
     weigh(s);
@@ -255,7 +284,7 @@ static Ending iterate(Workspace *s, const Options *o, int begin) {
     s->iteration++;
     /* Where this step was the last one, as Newton's method promises, no more is needed. */
     const int goes_on = error > sqrt(o->tolerance) || s->length < 1.0 || s->mu > 10.0 * floor;
-    evaluate_at_iterate(s, goes_on);
+    evaluate_program(s, goes_on);
     s->seconds = before + clock_seconds() - started;
     if (s->seconds - before >= o->pause) return PAUSED;
   }

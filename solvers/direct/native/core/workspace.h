@@ -17,6 +17,7 @@
  *   stage_slope(x, u, d, lambda, y)     the same without the last
  *   start_value(x, d), start_full(x, d, y)   c   |   c, c_w, (y'c)_ww
  *   end_value(x, d), end_full(x, d, y)       l, c   |   l, c, l_w, c_w, (l + y'c)_ww
+ *   stage_half(x, u, d)                 next state, with half the integration step
  */
 
 #include <math.h>
@@ -46,6 +47,7 @@ typedef struct {
   double pause;         /* after so long native_solve() returns PAUSED, to be called again [s] */
   double warm;          /* whether the costates are a guess of value */
   double monotone;      /* whether the barrier parameter only falls, from the beginning */
+  double frozen;        /* whether to solve the program of frozen.h, from its own multipliers */
 } Options;
 
 typedef enum {
@@ -88,6 +90,12 @@ typedef struct {
   /* 1.0 where an entry of u, or of x_0, is given and not an unknown. */
   double *u_given, *x_given;
   double sides; /* number of slacks */
+  double *sizes; /* of the states, (NX): what the accuracy of the integration is relative to */
+
+  /* The plan that a warm start is read off from: its nodes [s], states, controls, costates. */
+  double *plan_t, *plan_x, *plan_u, *plan_lambda;
+  double *u_first;   /* controls of the first iterate */
+  double *half_step; /* by how much half the integration step moves the ends of the intervals */
 
   /* Step. */
   double *dx, *du, *dlambda, *ds_low, *dz_low, *ds_up, *dz_up, *dy;
@@ -104,6 +112,11 @@ typedef struct {
   double *gradient;  /* of the cost l, [n + 1][NW] */
   double *hessian;   /* of the Lagrangian, [n + 1][NW][NW] */
   double *c_slope;   /* of the rows, one [NW] a row, in the order of the rows */
+
+  /* Where the program is frozen, see frozen.h, and what was evaluated there. */
+  int is_frozen;
+  double cost_frozen, *x_frozen, *u_frozen, *gap_frozen, *v_frozen, *gradient_frozen;
+  double *lambda_frozen, *s_low_frozen, *z_low_frozen, *s_up_frozen, *z_up_frozen, *y_frozen;
 
   /* Condensed system: weights and right-hand side. */
   double *r_low, *r_up, *r_y, *corr_low, *corr_up, *sigma, *force, *dv;
@@ -156,24 +169,32 @@ static char *lay_out(Workspace *s, char *at, int n) {
   s->n = n;
   s->rows = rows_begin(n) + NB + NE;
   double **states[] = {&s->x,  &s->lambda,  &s->dx,      &s->dlambda,
-                       &s->ex, &s->elambda, &s->x_trial, &s->p};
-  double **controls[] = {&s->u, &s->du, &s->eu, &s->u_trial, &s->kappa, &s->pivot, &s->u_given};
+                       &s->ex, &s->elambda, &s->x_trial, &s->p,
+                       &s->plan_x, &s->plan_lambda, &s->x_frozen, &s->gap_frozen,
+                       &s->lambda_frozen};
+  double **controls[] = {&s->u,     &s->du,      &s->eu,     &s->u_trial, &s->kappa,
+                         &s->pivot, &s->u_given, &s->plan_u, &s->u_first, &s->u_frozen};
   double **flat[] = {&s->s_low,  &s->z_low,    &s->s_up,   &s->z_up,    &s->y,     &s->low,
                      &s->up,     &s->has_low,  &s->has_up, &s->is_equation, &s->ds_low, &s->dz_low,
                      &s->ds_up,  &s->dz_up,    &s->dy,     &s->ey,      &s->v,     &s->v_trial,
                      &s->r_low,  &s->r_up,     &s->r_y,    &s->corr_low, &s->corr_up, &s->sigma,
-                     &s->force,  &s->dv};
+                     &s->force,  &s->dv,       &s->v_frozen, &s->s_low_frozen,
+                     &s->z_low_frozen, &s->s_up_frozen, &s->z_up_frozen, &s->y_frozen};
   for (size_t i = 0; i < sizeof states / sizeof *states; i++) *states[i] = take(&at, m * NX);
   for (size_t i = 0; i < sizeof controls / sizeof *controls; i++)
     *controls[i] = take(&at, m * AT_LEAST_1(NU));
   for (size_t i = 0; i < sizeof flat / sizeof *flat; i++)
     *flat[i] = take(&at, (size_t)AT_LEAST_1(s->rows));
   s->x_given = take(&at, NX);
+  s->sizes = take(&at, NX);
+  s->plan_t = take(&at, m);
   s->data = take(&at, m * ND);
   s->gap = take(&at, m * NX);
   s->gap_trial = take(&at, m * NX);
+  s->half_step = take(&at, m * NX);
   s->slope = take(&at, m * NX * NW);
   s->gradient = take(&at, m * NW);
+  s->gradient_frozen = take(&at, m * NW);
   s->rhs = take(&at, m * NW);
   s->hessian = take(&at, m * NW * NW);
   s->c_slope = take(&at, ((size_t)NI + m * NC + NE + 1) * NW);
