@@ -206,10 +206,10 @@ def test_a_recorded_correction_replays_to_the_last_bit(tmp_path: Path) -> None:
 
 def test_a_copy_has_nothing_prepared() -> None:
     mpc = controller(pendulum(), real_time=True)
-    mpc.step([0.6, 0.2], 0.0)
+    plan = mpc.step([0.6, 0.2], 0.0).plan
+    assert plan is not None
     assert mpc.prepare_next()
-    copy = deepcopy(mpc)
-    x = copy.state.plan.state(DT)
+    copy, x = deepcopy(mpc), plan.state(DT)
     assert copy.step(x, DT).source is InputSource.OPTIMAL
     assert mpc.step(x, DT).source is InputSource.REAL_TIME
 

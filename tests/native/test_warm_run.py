@@ -42,7 +42,9 @@ def pushed(**changes) -> OCP:
 
 @pytest.fixture(scope="module")
 def program() -> MultipleShootingProgram:
-    return NATIVE.build(pushed())
+    program = NATIVE.build(pushed())
+    assert isinstance(program, MultipleShootingProgram)
+    return program
 
 
 @pytest.fixture
