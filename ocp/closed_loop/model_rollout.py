@@ -81,20 +81,20 @@ class ModelRollout:
 
         It is relative to the sizes of ``imposed``, where there are any.
         """
-        rows, found = self._rows, [Violation()]
+        rows, found = self._rows, []
         sizes = self.imposed.sizes if self.imposed else None
-        if rows.states.is_imposed:
+        if rows.states.is_imposed and not rows.states.box.contains(x[1:]):
             exempt = self._exempt_states[1:]
             own = sizes and sizes.states
             found.append(rows.states.largest_violation(x[1:], t[1:], exempt=exempt, sizes=own))
-        if rows.controls.is_imposed:
+        if rows.controls.is_imposed and not rows.controls.box.contains(u):
             found.append(rows.controls.largest_violation(u, t, sizes=sizes and sizes.controls))
         if rows.path.is_imposed:
             nodes = np.vstack([p[0], p[1][-1:]])
             values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
             own = sizes and sizes.path
             found.append(rows.path.largest_violation(values, t, exempt=self._exempt, sizes=own))
-        return _in_words(max(found, key=_relative))
+        return _in_words(max(found, key=_relative)) if found else (0.0, "")
 
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
         """Return the largest violation of a terminal constraint by a final state (nx,)."""

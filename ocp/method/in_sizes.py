@@ -8,6 +8,7 @@ from ocp.method.rewriting import Rewriting, RewrittenGuess
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP
+from ocp.solution.shifted_plan import ShiftedPlan
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess
 
@@ -37,12 +38,21 @@ class InSizes(Rewriting):
         return data.x0 / self.scaled.sizes.x
 
     def guess(self, given: InitialGuess, data: RunData) -> InitialGuess:
-        """Return a guess that is sampled in sizes."""
-        sizes = self.scaled.sizes
+        """Return a guess that is sampled in sizes; an earlier plan stays one."""
+        earlier, sizes = ShiftedPlan.of(given), self.scaled.sizes
+        if earlier is not None and self._is_held_here(earlier.plan):
+            plan = self.written(earlier.plan)
+            return plan if given is earlier.plan else ShiftedPlan(plan, earlier.t0)
         size = {"x": sizes.x, "u": sizes.u, "costate": sizes.cost / sizes.x}
         return RewrittenGuess(
             given, lambda part, _, values: values / size[part], self.original.model
         )
+
+    def _is_held_here(self, plan: Solution) -> bool:
+        """Whether a plan has held controls, and the numbers of states and controls of this one."""
+        m = self.original.model
+        fits = (plan.x.shape[1], plan.u.shape[1]) == (m.nx, m.nu)
+        return fits and plan.control_kind == "held"
 
     def answer(self, found: Solution) -> Solution:
         """Return a solution of the scaled problem as one of the original."""

@@ -30,6 +30,7 @@ from ocp.mpc.controller_state import ControllerState
 from ocp.mpc.fallback_ladder import FallbackLadder
 from ocp.mpc.plant_input import PlantInput
 from ocp.mpc.step_inputs import Parameters
+from ocp.mpc.terms_of_one_horizon import refuse_terms_of_one_horizon
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import row_sizes
 from ocp.solution.solver import FeedbackProgram, InitialGuess, Solver
@@ -49,9 +50,9 @@ class MPC:
     always finite and within its bounds. Where the new plan cannot be used, the next rung of
     this ladder is taken, and the decision says so:
 
-    1. the new plan, ``OPTIMAL``; with ``real_time`` the prepared one, ``REAL_TIME``; or
-       ``FEASIBLE`` where the solver stopped early: then the
-       model is run under its controls, and it must meet the constraints;
+    1. the new plan, ``OPTIMAL``; with ``real_time`` a prepared one, corrected, ``REAL_TIME``; where
+       the solver stopped early ``FEASIBLE``. The model is run under the controls of these two,
+       and must meet the constraints;
     2. the remainder of the last good plan, ``SHIFTED``, run on the model from the measured
        state: it must meet the constraints;
     3. where no plan meets the constraints, the new plan that violates those on states least,
@@ -189,7 +190,7 @@ class MPC:
             raise UnsupportedProblem(f"MPC of {name}: the final time is free, a horizon is needed")
         if self.ocp.has_free_start:
             raise UnsupportedProblem(f"MPC of {name}: its start is free, here it is measured")
-        self._check_terms()
+        refuse_terms_of_one_horizon(self.ocp, self.applied)
         check_positive(dt, f"MPC of {name}: dt [s]")
         if model.dt is not None and abs(dt - model.dt) > 1e-9 * model.dt:
             raise ProblemError(f"MPC of {name}: dt = {dt} s, but the model's step is {model.dt} s")
@@ -202,48 +203,6 @@ class MPC:
         check_not_negative(self.tolerance, f"MPC of {name}: tolerance", finite=False)
         check_flag(self.least_violating, f"MPC of {name}: least_violating")
         check_flag(self.real_time, f"MPC of {name}: real_time")
-
-    def _check_terms(self) -> None:
-        """Refuse what has no meaning over a horizon that moves with time."""
-        name = self.ocp.name
-        if self.ocp.unknowns:
-            raise UnsupportedProblem(
-                f"MPC of {name}: '{self.ocp.unknowns[0].name}' is an unknown constant, which every "
-                "step would choose anew: solve for it once, and make it a Parameter of that value"
-            )
-        if at_instants := self.ocp.at("instants"):
-            raise UnsupportedProblem(
-                f"MPC of {name}: '{at_instants[0].name}' holds at instants of one horizon, a "
-                "loop's moves: write at='path' with a signal of the horizon that says when it holds"
-            )
-        if self.ocp.data:
-            raise UnsupportedProblem(
-                f"MPC of {name}: the data '{self.ocp.data[0].name}' are of one horizon, a "
-                "loop's moves: estimate first, and make what was unknown a Parameter"
-            )
-        if integrals := self.ocp.at("integral"):
-            raise UnsupportedProblem(
-                f"MPC of {name}: the integral constraint '{integrals[0].name}' would begin anew at "
-                "every step: carry the integral as a state, bounded at the end"
-            )
-        if self.ocp.delays:
-            raise UnsupportedProblem(
-                f"MPC of {name}: a loop keeps what is on its way itself: leave the Delay of "
-                f"'{self.ocp.delays[0].control}' out, and say MPC(delay=...) [s]"
-            )
-        if self.ocp.rates and self.ocp.last_input is None:
-            raise UnsupportedProblem(
-                f"MPC of {name}: the last input is free, here it is what was applied; say what it "
-                "is before the first step: last_input=..."
-            )
-        if self.ocp.rates and self.applied.what != "control":
-            raise UnsupportedProblem(
-                f"MPC of {name}: the rates are those of controls, and no control is applied"
-            )
-        if self.ocp.refers_to_start:
-            raise UnsupportedProblem(
-                f"MPC of {name}: a term contains the state at the start, which every step moves"
-            )
 
     @property
     def is_stateful(self) -> bool:

@@ -59,9 +59,8 @@ class HorizonParameters(NamedTuple):
 
     def between(self, times: np.ndarray) -> IntervalParameters:
         """Return those at both ends of the intervals between instants (N + 1,) [s]."""
-        if not self.values.entries:
-            none = np.empty((len(times) - 1, 0))
-            return none, none
+        if not self.values.entries:  # where it is on the horizon does not matter
+            return self.values.on(times)
         return self.values.on((times - self.start) / self.duration)
 
 

@@ -99,13 +99,15 @@ class InputCollector:
             given: parameters of the horizon of the next step; None: what the controller's own say.
         """
         seen = state.seen
-        if seen is None or not seen.acting:
+        # More than one where measurements were missing since.
+        steps = 0 if seen is None else len(seen.acting) - state.steps_late
+        if seen is None or steps < 1:
             return None
-        t = seen.t + self.dt
+        t = seen.t + steps * self.dt
         p, unknown = self._horizon_parameters(state, t + self.delay, given)
         acting, at_effect = seen.acting, p.at(t + self.delay)
         start = seen.x
-        for k, sent in enumerate(acting if self.compensate else acting[:1]):
+        for k, sent in enumerate(acting if self.compensate else acting[:steps]):
             start = self._next_state(start, sent, seen.t + k * self.dt, at_effect)
         return StepInputs(t, t + self.delay, start, p, at_effect, not unknown, unknown, None)
 

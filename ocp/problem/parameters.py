@@ -304,6 +304,9 @@ class ParameterValues:
         In between they are interpolated linearly, which is exact where the knots of the
         signals are among the nodes of the grid.
         """
+        if not self.entries:
+            none = np.empty((len(fractions) - 1, 0))
+            return none, none
         return self.at(fractions[:-1], 1), self.at(fractions[1:], -1)
 
     @property

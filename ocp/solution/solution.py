@@ -100,7 +100,8 @@ class Solution:
             known = ", ".join(_KINDS)
             raise ProblemError(f"solution: control_kind = {self.control_kind!r} is none of {known}")
         for name in ARRAYS:
-            check_instance(getattr(self, name), np.ndarray, f"solution: {name}")
+            if not isinstance(array := getattr(self, name), np.ndarray):
+                check_instance(array, np.ndarray, f"solution: {name}")
         n, m = len(self.t), self.problem.model
         object.__setattr__(self, "breaks", np.asarray(self.breaks, dtype=int))
         rows = n - 1 if self.control_kind == "held" else n
@@ -118,13 +119,13 @@ class Solution:
                 raise ProblemError(f"solution: {name} has shape {array.shape}, {shape} is needed")
             if not _is_finite(array):
                 raise ProblemError(f"solution: {name} is not finite")
-        if n < 2 or not (self.t[1:] > self.t[:-1]).all():
+        if n < 2 or np.count_nonzero(self.t[1:] > self.t[:-1]) < n - 1:
             raise ProblemError("solution: t does not increase from node to node")
         for name in ("cost", "residual"):
-            check_instance(
-                getattr(self, name), (float, int, np.floating, np.integer), f"solution: {name}"
-            )
-            if np.isnan(getattr(self, name)):
+            value = getattr(self, name)
+            if not isinstance(value, float):
+                check_instance(value, (float, int, np.floating, np.integer), f"solution: {name}")
+            if value != value:
                 raise ProblemError(f"solution: {name} is NaN")
 
     def _check_breaks(self) -> int:

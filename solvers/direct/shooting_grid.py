@@ -56,10 +56,14 @@ class ShootingGrid:
 
     def schedule(self, data: RunData, duration: float) -> list[np.ndarray]:
         """Return t, h and the parameters at both ends of every interval, one column each."""
-        nodes = self.fractions
-        left, right = data.values.on(nodes)
-        t = data.t0 + nodes[None, :-1] * duration
-        return [t, duration * node_widths(nodes)[None, :], left.T, right.T]
+        left, right = data.values.on(self.fractions)
+        t = data.t0 + self.fractions[None, :-1] * duration
+        return [t, duration * self._widths, left.T, right.T]
+
+    @cached_property
+    def _widths(self) -> np.ndarray:
+        """Of the intervals, as fractions of the horizon, (1, N)."""
+        return node_widths(self.fractions)[None, :]
 
     def first_iterate(
         self,

@@ -182,6 +182,22 @@ def test_delays_are_part_of_what_is_expected() -> None:
     assert set(rollout.sources[1:]) == {InputSource.REAL_TIME}
 
 
+@pytest.mark.parametrize("compensate", [True, False])
+def test_a_missing_measurement_is_bridged(compensate: bool) -> None:
+    ocp = pendulum(constraints=())
+    mpc = controller(ocp, real_time=True, delay=DT, compensate=compensate)
+    mpc.reset([0.0])
+    mpc.step([0.6, 0.2], 0.0)
+    assert mpc.prepare_next()
+    assert mpc.step([np.nan, 0.2], DT).source is InputSource.SHIFTED
+    assert mpc.prepare_next()
+    assert mpc.state.seen is not None
+    x, acting = np.array([0.6, 0.2]), mpc.state.seen.acting
+    for k in range(2):
+        x = mpc._ladder._check.next_state(x, acting[k], k * DT, np.empty(0))
+    assert mpc.step(x, 2 * DT).source is InputSource.REAL_TIME
+
+
 def test_rates_reach_it_through_the_normal_form() -> None:
     ocp = pendulum(rates=(Rate(U, -20.0, 20.0),), last_input=[0.0], constraints=())
     mpc = controller(ocp, real_time=True)
@@ -206,10 +222,10 @@ def test_a_recorded_correction_replays_to_the_last_bit(tmp_path: Path) -> None:
 
 def test_a_copy_has_nothing_prepared() -> None:
     mpc = controller(pendulum(), real_time=True)
-    mpc.step([0.6, 0.2], 0.0)
+    plan = mpc.step([0.6, 0.2], 0.0).plan
+    assert plan is not None
     assert mpc.prepare_next()
-    copy = deepcopy(mpc)
-    x = copy.state.plan.state(DT)
+    copy, x = deepcopy(mpc), plan.state(DT)
     assert copy.step(x, DT).source is InputSource.OPTIMAL
     assert mpc.step(x, DT).source is InputSource.REAL_TIME
 

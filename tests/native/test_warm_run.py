@@ -7,8 +7,20 @@ import numpy as np
 import pytest
 
 from models import cart_pole_upright
-from ocp import OCP, Box, Guess, Model, Parameter, Program, Signal, Solution, Status
-from ocp.internal import ShiftedPlan
+from ocp import (
+    OCP,
+    Box,
+    Guess,
+    Model,
+    Parameter,
+    ProblemError,
+    Program,
+    Signal,
+    Solution,
+    Status,
+    solve,
+)
+from ocp.internal import ShiftedPlan, scaled
 from solvers import MultipleShooting
 from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.direct.native.native_solve import NativeSolve
@@ -42,7 +54,9 @@ def pushed(**changes) -> OCP:
 
 @pytest.fixture(scope="module")
 def program() -> MultipleShootingProgram:
-    return NATIVE.build(pushed())
+    program = NATIVE.build(pushed())
+    assert isinstance(program, MultipleShootingProgram)
+    return program
 
 
 @pytest.fixture
@@ -152,6 +166,32 @@ def test_a_warm_run_that_fails_is_not_made_twice(program, monkeypatch, solved) -
     found = program.run(x0=[0.7, -0.1], guess=base).or_raise()
     assert made == [1.0, 0.0]
     assert found.cost == pytest.approx(by_phases(program, monkeypatch, x0=[0.7, -0.1]).cost)
+
+
+def test_a_scaled_problem_starts_from_its_earlier_plan(monkeypatch, solved) -> None:
+    large, small = 1e4, 1e-3
+    ocp = pushed(
+        model=Model(
+            name="far", x=X, u=U, f=ca.vertcat(X[1], large * U / small + PULL * X[0] + large * WIND)
+        ),
+        x0=[0.8 * large, 0.0],
+        running_cost=(X[0] / large) ** 2 + 0.1 * (X[1] / large) ** 2 + 0.05 * (U / small) ** 2,
+        control_bounds=Box(-2.5 * small, 2.5 * small),
+        state_bounds=Box([-2.0 * large, -0.9 * large], [2.0 * large, 2.0 * large]),
+    )
+    assert scaled(ocp) is not None
+    program = NATIVE.build(ocp)
+    base = program.run().or_raise()
+    before = len(solved)
+    for guess in (base, ShiftedPlan(base, 0.05)):
+        given = {"x0": [0.7 * large, 0.0], "t0": 0.05, "guess": guess}
+        quick, slow = program.run(**given).or_raise(), by_phases(program, monkeypatch, **given)
+        np.testing.assert_allclose(quick.x / large, slow.x / large, atol=SAME)
+        np.testing.assert_allclose(quick.u / small, slow.u / small, atol=SAME)
+    assert len(solved) == before + 2  # those of the phases
+    other = solve(cart_pole_upright(), replace(NATIVE, intervals=5))
+    with pytest.raises(ProblemError, match="guess: the solution has 4 of x, 2 are needed"):
+        program.run(guess=other)
 
 
 def test_controls_that_are_given_stay_so() -> None:

@@ -147,3 +147,17 @@ def test_no_run(value):
     for given_data in ({"x0": value}, {"t0": value}, {"guess": Guess(u=value)}):
         with pytest.raises(ProblemError):
             program.run(**given_data)
+
+
+def test_finite_numbers_whose_squares_are_not_are_numbers() -> None:
+    np.testing.assert_array_equal(check_numbers([1e200, -1e300], 2, "these"), [1e200, -1e300])
+    both = check_numbers([-np.inf, np.inf], 2, "bounds", finite=False)
+    np.testing.assert_array_equal(both, [-np.inf, np.inf])
+    with pytest.raises(ProblemError, match=r"these\[1\] is inf"):
+        check_numbers([1e200, np.inf], 2, "these")
+    with pytest.raises(ProblemError, match=r"bounds\[0\] is nan"):
+        check_numbers([np.nan, np.inf], 2, "bounds", finite=False)
+    solution = solve(van_der_pol(), MultipleShooting(10))
+    assert solution.with_(costate=0.0 * solution.costate + 1e200).costate[0, 0] == 1e200
+    with pytest.raises(ProblemError, match="costate is not finite"):
+        solution.with_(costate=solution.costate + np.inf)

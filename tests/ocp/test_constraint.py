@@ -26,6 +26,15 @@ def boxes_and_values(draw: st.DrawFn) -> tuple[Box, np.ndarray]:
 
 
 @given(boxes_and_values())
+def test_a_box_contains_what_exceeds_it_nowhere(case: tuple[Box, np.ndarray]) -> None:
+    box, values = case
+    assert box.contains(values) == (not box.excess(values).any())
+    assert box.contains(box.clip(values))
+    values[-1, 0] = np.nan
+    assert not box.contains(values)
+
+
+@given(boxes_and_values())
 def test_clip_is_the_nearest_point_and_excess_its_distance(case: tuple[Box, np.ndarray]) -> None:
     box, values = case
     clipped = box.clip(values)

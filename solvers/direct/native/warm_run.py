@@ -121,11 +121,11 @@ class WarmRun:
         return is_optimal and is_accurate and report.primal <= VIOLATED
 
     def _result(self, data: RunData, report: NativeReport) -> RunResult:
-        at, tr, notes = self._arrays, self._transcription, self.solver.library.notes()
+        at, notes = self._arrays, self.solver.library.notes()
         evaluations = int(report.evaluations)
         return RunResult(
             status=Status.SOLVED,
-            t=data.t0 + tr.fractions * self._ocp.duration,
+            t=data.t0 + self._since_start,
             x=at.x.copy(),
             costate=at.costate.copy(),
             u=at.u.copy(),
@@ -143,6 +143,11 @@ class WarmRun:
     @cached_property
     def _ocp(self) -> OCP:
         return self._transcription.ocp
+
+    @cached_property
+    def _since_start(self) -> np.ndarray:
+        """Instants of the nodes after the start [s], (N + 1,)."""
+        return self._transcription.fractions * self._ocp.duration
 
     @cached_property
     def _arrays(self) -> NativeArrays:
