@@ -1,4 +1,4 @@
-"""What holds for all tests: none fails by the clock; of what goes over a library a third runs."""
+"""What holds for all tests: none fails by the clock; of what is done many times a third runs."""
 
 from collections import Counter
 
@@ -9,7 +9,7 @@ from hypothesis import settings
 settings.register_profile("no clock", deadline=None)
 settings.load_profile("no clock")
 
-# One in so many of the cases of a test that goes over the library; the others run at night.
+# One in so many of the cases of a test that goes over the library, or over many inputs.
 _SHARE = 3
 
 
@@ -18,20 +18,37 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--nightly", action="store_true", help="run every case of every test")
 
 
+@pytest.hookimpl(tryfirst=True)  # before pytest looks which tests are slow
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out two in three cases of the tests that are marked ``over_library``.
+    """Take one in three cases of the tests that do the same many times.
 
-    Which ones is always the same. Of several poses of one case another third runs each, since
-    their number is no multiple of three.
+    Of those marked ``over_library`` the others run in ``make nightly`` only; of those marked
+    ``many`` they are slow: ``make quick`` leaves them out, ``make test`` does not. Which ones is
+    always the same.
     """
-    if config.getoption("--nightly"):
-        return
-    counts, kept, left = Counter[str](), [], []
-    for item in items:
-        name = item.nodeid.split("[")[0]
-        chosen = item.get_closest_marker("over_library") is None or counts[name] % _SHARE == 0
-        counts[name] += 1
-        (kept if chosen else left).append(item)
-    if left:
+    kept, left = [], []
+    for item, is_chosen in _with_choice(items):
+        if item.get_closest_marker("many") and not is_chosen:
+            item.add_marker(pytest.mark.slow)
+        if item.get_closest_marker("over_library") and not is_chosen:
+            left.append(item)
+        else:
+            kept.append(item)
+    if left and not config.getoption("--nightly"):
         config.hook.pytest_deselected(items=left)
         items[:] = kept
+
+
+def _with_choice(items: list[pytest.Item]) -> list[tuple[pytest.Item, bool]]:
+    """Return every item, and whether it is the one of three cases of its test.
+
+    It is the first of the first three, the last of the next, the middle one of those: where a case
+    comes in three ways, or in two, all of them are among what is taken.
+    """
+    counts, found = Counter[str](), []
+    for item in items:
+        name = item.nodeid.split("[")[0]
+        k = counts[name]
+        found.append((item, (k + k // _SHARE) % _SHARE == 0))
+        counts[name] += 1
+    return found

@@ -307,7 +307,14 @@ def test_an_orbit_in_any_unit(metre: float, second: float) -> None:
     assert found.status.is_success, found.message
     assert found.x[-1, 0] * metre / UNIT == pytest.approx(1.52545, rel=1e-5)
     assert found.iterations < 30
-    assert Cause.UNSOLVED not in [finding.cause for finding in diagnose(asked).findings]
+
+
+@pytest.mark.slow
+@pytest.mark.over_library
+@pytest.mark.parametrize(("metre", "second"), UNITS)
+def test_an_orbit_in_any_unit_is_diagnosed_as_solved(metre: float, second: float) -> None:
+    findings = diagnose(transfer(metre, second)).findings
+    assert Cause.UNSOLVED not in [finding.cause for finding in findings]
 
 
 @pytest.mark.parametrize(("metre", "second"), UNITS)
