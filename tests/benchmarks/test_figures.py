@@ -56,6 +56,7 @@ def draw(number: str, out: Path) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("number", QUICK)
 def test_quick_figures_are_drawn(number, drawn):
     assert drawn(number)

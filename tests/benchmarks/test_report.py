@@ -136,6 +136,7 @@ WHITELISTED = re.compile(r"[A-Za-z0-9_-]+")
 SCRIPTS = len(Page(report_page([row()], [], "A report")).all("script"))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", NAMES)
 def test_no_name_is_more_than_text(name):
     named = {"suite": name, "case": name, "message": name, "worst": name, "status": name}
@@ -157,6 +158,7 @@ def test_no_name_is_more_than_text(name):
     assert len(page.all("script")) == SCRIPTS
 
 
+@pytest.mark.slow
 def test_suites_that_differ_in_signs_only_have_addresses_of_their_own():
     rows = [row(suite=name) for name in ("a b", "a-b", "a?b", "a-b-2", "???", "!", "x-figure_1")]
     names = [part.name for part in parts_of(rows)]
@@ -188,6 +190,7 @@ def test_the_page_has_its_own_colours(text):
     assert not re.search(r"#0[123][0-9a-f]{4}\b", drawings)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "rows",
     [

@@ -164,6 +164,7 @@ def test_what_no_grid_solves_is_said():
         certify(start, QUICK)
 
 
+@pytest.mark.slow
 def test_stiff_dynamics_are_certified_by_two_kinds_of_collocation() -> None:
     """No explicit grid follows a lag of 0.1 ms over a second."""
     x, y, u = (ca.SX.sym(name) for name in "xyu")

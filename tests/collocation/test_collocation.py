@@ -85,6 +85,7 @@ COARSE = {
 }
 
 
+@pytest.mark.many
 @both
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PROBLEMS]

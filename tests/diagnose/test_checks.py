@@ -393,6 +393,7 @@ def test_a_speed_limit_is_a_matter_of_time():
     assert float(told[1]) == pytest.approx(2.58, rel=0.01)
 
 
+@pytest.mark.slow
 def test_time_that_vanishes_and_time_without_end():
     shrinking = of.fastest(horizon=FreeTime(2.0), constraints=of.ends({"position": 0.0}))
     assert _first(shrinking) is Cause.VANISHING_TIME
@@ -443,6 +444,7 @@ def minimum_time(
     )
 
 
+@pytest.mark.slow
 def test_idle_optimum_and_idle_constraint():
     assert _first(of.servo(running_cost=lambda s: s.spot**2 + s.voltage**2)) is Cause.UNUSED
     # The start is the goal.

@@ -85,6 +85,7 @@ def test_failed_solution():
     assert "velocity" in first.where
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("build", [pendulum, lag, energy])
 def test_signals_time_and_discrete_time_are_no_mistakes(build):
     assert not diagnose(build(), intervals=30).serious

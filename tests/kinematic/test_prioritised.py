@@ -84,6 +84,7 @@ def test_first_task_is_independent_of_the_second(q: list[float], speed: float) -
     np.testing.assert_allclose(j @ dq, j @ alone.velocity(q), atol=slack)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("damping", [Damped(0.05), Filtered(0.05, 0.1)])
 @pytest.mark.parametrize("decoupled", [True, False])
 def test_velocities_stay_bounded_through_singular_configurations(

@@ -89,6 +89,7 @@ def test_the_arm_descends_the_cost_of_its_posture_in_the_null_space():
     np.testing.assert_allclose(u, -reach / 2 * null.T @ gradient, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_controller_whose_solver_always_fails_still_passes_the_obstacle():
     """The path is followed by the dynamics; the posture by the law, better than held inputs."""
     scenario = arm_scenario("arm-001")

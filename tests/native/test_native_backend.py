@@ -206,6 +206,7 @@ def test_a_library_that_cannot_be_loaded_is_a_named_error(
         NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
 
 
+@pytest.mark.slow
 def test_a_control_loop_acts_as_with_ipopt() -> None:
     ocp = cart_pole_upright()
     start = np.array([0.0, np.pi - 0.3, 0.0, 0.0])

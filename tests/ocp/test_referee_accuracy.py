@@ -124,6 +124,7 @@ def error_and_bar(kind: Kind, seed: int) -> tuple[float, float]:
     return abs(verdict.cost - cost) / abs(cost), verdict.cost_error / abs(cost)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_cost_is_within_its_own_error_bar(kind: Kind, seed: int) -> None:

@@ -31,6 +31,7 @@ PULSES = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("pulse", PULSES.values(), ids=list(PULSES))
 @pytest.mark.parametrize(
     "solver",

@@ -135,6 +135,7 @@ def every(solvers: list[Any]) -> list[Any]:
     ]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("name", "solver"), every(DIRECT))
 def test_a_direct_method_solves_it_as_the_formula(name: str, solver: Solver) -> None:
     called, written = PROBLEMS[name]
@@ -145,6 +146,7 @@ def test_a_direct_method_solves_it_as_the_formula(name: str, solver: Solver) -> 
     assert evaluate(found).cost == pytest.approx(evaluate(expected).cost, rel=1e-6)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("name", "solver"), every(UNCONSTRAINED))
 def test_a_method_without_constraints_as_well(name: str, solver: Solver) -> None:
     called, written = (with_free_end(each) for each in PROBLEMS[name])

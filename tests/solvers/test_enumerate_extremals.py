@@ -49,11 +49,13 @@ def test_the_scan_is_the_same_every_time_and_fine_where_it_says_so() -> None:
     assert one.scans[0].distances.max() <= 0.3
 
 
+@pytest.mark.slow
 def test_few_points_are_admitted() -> None:
     found = enumerate_extremals(arm_scenario("arm-001").ocp("sum"), points=100, keep=1)
     assert found.unresolved > 0
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm-001-sum", "arm-009-sum", "arm-015-sum", "arm-030-sum"])
 def test_the_reference_is_found(name: str) -> None:

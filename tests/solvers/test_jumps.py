@@ -230,6 +230,7 @@ def test_a_weight_that_grows_with_time_is_replaced(solver) -> None:
     assert found.cost == pytest.approx(evaluate(found).cost, rel=1e-4)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("hold", ["held", "linear"])
 def test_a_price_that_is_negative_for_a_sample_keeps_its_kink(hold) -> None:
     price, samples = ca.SX.sym("price"), np.ones((42, 1))
@@ -290,6 +291,7 @@ def test_nothing_to_replace():
         without_kinks(fuel(U**2))
 
 
+@pytest.mark.slow
 def test_the_advice_on_a_kink_leads_on():
     for smoothness in (0, 2):
         kinked = fuel(ca.fabs(U), smoothness=smoothness)

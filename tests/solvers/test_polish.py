@@ -37,6 +37,7 @@ def held(case: Case) -> Solution:
     return solve(case.build(), MultipleShooting(75))
 
 
+@pytest.mark.slow
 def test_starts_again_from_a_finer_grid_where_newton_fails() -> None:
     direct = held(case_called("arm-024-sum"))
     plain = solve(direct.problem, IndirectShooting(segments=15), guess=direct)

@@ -71,7 +71,7 @@ def judge(case: Case, family: Family, solution: Solution) -> None:
 
 
 def marked(case: Case, label: str, *values: object):
-    marks = [pytest.mark.slow] if case.name in SLOW else []
+    marks = [pytest.mark.slow, pytest.mark.over_library] if case.name in SLOW else []
     return pytest.param(case, *values, id=f"{case.name}-{label}", marks=marks)
 
 

@@ -33,6 +33,7 @@ FLAT = {
 }  # fmt: skip
 CASES = [c for c in all_cases() if c.suite == "library" and c.name not in FLAT]
 QUICK = {"van-der-pol", "bryson-denham", "brachistochrone", "catalyst-mixing", "mass-tracking"}
+SLOW = [pytest.mark.slow, pytest.mark.over_library]
 SOLVERS: tuple[Solver, ...] = (MultipleShooting(40), Collocation(15))
 
 
@@ -49,7 +50,7 @@ def same_in_other_units(ocp: OCP, solver: Solver, seed: int) -> None:
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(c, id=c.name, marks=[] if c.name in QUICK else [pytest.mark.slow])
+        pytest.param(c, id=c.name, marks=[] if c.name in QUICK else SLOW)
         for c in CASES
     ],
 )
