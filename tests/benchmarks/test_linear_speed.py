@@ -33,6 +33,7 @@ def test_exponent_is_the_slope_of_the_long_horizons():
 RATIOS = {"stable plant 2.50": 26.66, "mass 2.92": 14.07, "Van der Pol": 2.01}
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_greedy_costs_more_on_every_plant(name):
     found = gap(name)

@@ -95,6 +95,7 @@ def test_what_was_lost_is_computed_again_only_where_asked(tmp_path):
     assert row.solved
 
 
+@pytest.mark.slow
 def test_a_row_is_written_before_the_next_is_computed(tmp_path):
     """The second method never ends; the first one's row is in the file while it hangs."""
     told: list[Row] = []

@@ -405,6 +405,7 @@ def test_a_guess_that_is_too_short_is_no_time_without_end():
     assert _first(minimum_time(distance=100.0, horizon=FreeTime(0.5, 0.1, 1000.0))) is None
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("unit", [1.0, 1e-6])
 def test_from_one_bound_to_the_other_is_a_decision_in_any_unit(unit):
     causes = {f.cause for f in diagnose(minimum_time(unit=unit)).findings}

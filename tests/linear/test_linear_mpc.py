@@ -53,6 +53,7 @@ def needs(backend: str) -> None:
 # -- the thesis' example ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_constraints_hold_at_every_step_and_short_horizons_are_myopic():
     peaks = {0: peak(finite())}
     for steps in (5, 10, 20, 40):

@@ -46,6 +46,7 @@ SAME_OPTIMUM = 1e-8
 SAME_COSTATE = 1e-5
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("make", [swing, free_time, designed, held_still])
 def test_it_finds_the_optimum_of_ipopt(make) -> None:
     ocp = make()

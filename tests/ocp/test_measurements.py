@@ -60,6 +60,7 @@ def closed_form() -> tuple[np.ndarray, float]:
     return found.x, 2 * found.cost
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("solver", "accuracy"),
     [

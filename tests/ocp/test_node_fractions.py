@@ -34,6 +34,7 @@ def signal(samples, hold: Literal["held", "linear"] = "held") -> Signal:
     return Signal("r", R, samples, hold=hold)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("hold", ["held", "linear"])
 @pytest.mark.parametrize(
     "solver",

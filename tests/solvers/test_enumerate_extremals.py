@@ -115,6 +115,7 @@ def test_roots_that_newton_does_not_confirm_are_counted() -> None:
     assert found.costs.shape == (0,)
 
 
+@pytest.mark.slow
 def test_steps_are_halved_until_the_cost_holds_still():
     # From few steps the same extremals as from many.
     ocp = bare()

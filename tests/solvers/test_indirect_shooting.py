@@ -88,6 +88,7 @@ def test_saturated_control(segments: int) -> None:
     assert solve(ocp, MultipleShooting(200)).cost == pytest.approx(cost, rel=DIRECT_COST)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("bounds", [Box(), Box(-0.4, 0.4)], ids=["free", "bounded"])
 def test_implicit_control(bounds: Box) -> None:
     ocp = quartic(control_bounds=bounds)

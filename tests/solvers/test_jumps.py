@@ -70,6 +70,7 @@ KINKS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("pull", JUMPS.values(), ids=list(JUMPS))
 @pytest.mark.parametrize("solver", [MultipleShooting(30), Collocation(10)], ids=repr)
 def test_a_jump_on_the_way_is_found(solver, pull):
@@ -146,6 +147,7 @@ def test_what_is_convex_is_replaced_and_the_rest_stays():
     assert without_kinks(fuel(ca.fabs(U))).smoothness == 2
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [
@@ -315,6 +317,7 @@ def test_indirect_methods_refuse_a_kink_in_the_control():
 # -- no error where there is an answer ----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_force_that_keeps_a_length_is_no_free_control():
     x, y, a, b, rod, f = (ca.SX.sym(name) for name in ("x", "y", "a", "b", "rod", "f"))
     bob = Model(

@@ -81,6 +81,7 @@ def coasting() -> OCP:
     return OCP(name="coasting", model=body, x0=[1.0], horizon=4, running_cost=x**2)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("solver", SOLVERS, ids=repr)
 @pytest.mark.parametrize(
     ("ocp", "cost"),

@@ -83,6 +83,7 @@ def test_two_redundant_degrees_of_freedom_need_no_trace() -> None:
     )
 
 
+@pytest.mark.slow
 def test_with_obstacle_from_near_by() -> None:
     ocp = arm_scenario("arm-001").ocp("sum")
     extremal = polish(solve(ocp, MultipleShooting(75)))

@@ -49,10 +49,7 @@ def same_in_other_units(ocp: OCP, solver: Solver, seed: int) -> None:
 @pytest.mark.parametrize("solver", SOLVERS, ids=["shooting", "collocation"])
 @pytest.mark.parametrize(
     "case",
-    [
-        pytest.param(c, id=c.name, marks=[] if c.name in QUICK else SLOW)
-        for c in CASES
-    ],
+    [pytest.param(c, id=c.name, marks=[] if c.name in QUICK else SLOW) for c in CASES],
 )
 def test_direct_methods(case, solver) -> None:
     if isinstance(solver, Collocation) and case.build().model.is_discrete:
@@ -65,6 +62,7 @@ def test_newton(seed) -> None:
     same_in_other_units(van_der_pol(), StagewiseNewton(40), seed)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("seed", range(3))
 def test_a_polished_answer(seed) -> None:
     ocp = van_der_pol()
@@ -102,6 +100,7 @@ def random_program(seed: int) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("backend", ["osqp", "quadprog"])
 @pytest.mark.parametrize("seed", range(25))
 def test_linear_mpc(seed, backend) -> None:
@@ -137,6 +136,7 @@ def speed_limited(length: float = 1.0, cost: float = 1.0) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("backend", "form"), [("osqp", "sparse"), ("daqp", "condensed")])
 @pytest.mark.parametrize("length", [1e3, 1e6])
 @pytest.mark.parametrize("price", [0.1, 10.0])
