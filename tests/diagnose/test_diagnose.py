@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from benchmarks.__main__ import main
 from benchmarks.mistakes import MISTAKES, SOUND
 from benchmarks.mistakes import problems as of
-from benchmarks.mistakes.judge import GOAL, judged, share
+from benchmarks.mistakes.judge import GOAL, judged
 from ocp import Box, Euler, ProblemError, solve
 from solvers import Diagnosis, Finding, MultipleShooting, diagnose, polish
 from solvers.diagnose.cause import Cause
@@ -141,15 +141,24 @@ def test_reach_is_decided_as_by_hand(seconds, ratio):
 
 
 @pytest.mark.slow
-def test_the_corpus_is_diagnosed():
+@pytest.mark.over_library
+@pytest.mark.parametrize("third", range(3))
+def test_the_corpus_is_diagnosed(third):
     """Each of its problems once; the numbers are those of docs/diagnose.md."""
-    mistakes = list(judged(MISTAKES))
-    assert share(mistakes) >= GOAL
-    assert share([v for v in mistakes if v.entry.held_out]) >= GOAL
-    assert [v.entry.name for v in mistakes if not v.is_right] == list(MISSED)
+    entries = MISTAKES[third::3]
+    missed = [v.entry.name for v in judged(entries) if not v.is_right]
+    assert missed == [entry.name for entry in entries if entry.name in MISSED]
+
+
+def test_what_is_missed_is_little():
+    assert set(MISSED) <= {m.name for m in MISTAKES}
+    for entries in (MISTAKES, [m for m in MISTAKES if m.held_out]):
+        assert sum(m.name not in MISSED for m in entries) >= GOAL * len(entries)
 
 
 @pytest.mark.slow
-def test_sound_problems_raise_no_alarm():
-    alarms = [v.entry.name for v in judged(SOUND) if not v.is_right]
+@pytest.mark.over_library
+@pytest.mark.parametrize("third", range(3))
+def test_sound_problems_raise_no_alarm(third):
+    alarms = [v.entry.name for v in judged(SOUND[third::3]) if not v.is_right]
     assert alarms == []

@@ -212,6 +212,7 @@ def test_steps_of_a_suggested_law_replay_to_the_last_bit(tmp_path: Path):
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize(("subject", "steps"), [("cart", 400), ("arm", 200)])
 def test_no_fault_gets_through_with_the_suggested_laws(subject, steps, monkeypatch):
     usual = SUBJECTS[subject]
