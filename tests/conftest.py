@@ -1,6 +1,8 @@
 """What holds for all tests: none fails by the clock; of what is done many times a third runs."""
 
+import gc
 from collections import Counter
+from collections.abc import Generator
 
 import pytest
 from hypothesis import settings
@@ -16,6 +18,16 @@ _SHARE = 3
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let ``make nightly`` ask for all of them."""
     parser.addoption("--nightly", action="store_true", help="run every case of every test")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Look for tests without looking for garbage, a third of the time: nothing is dropped here."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest looks which tests are slow
