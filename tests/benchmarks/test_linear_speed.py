@@ -8,6 +8,7 @@ from benchmarks.questions.greedy_gap import PROBLEMS, gap
 from benchmarks.speed.linear import Growth, situations
 
 
+@pytest.mark.slow
 def test_speed_prints_growth(capsys):
     assert main(["speed", "--horizons", "5", "10", "--count", "3"]) == 0
     shown = capsys.readouterr().out

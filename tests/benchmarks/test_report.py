@@ -266,6 +266,7 @@ def test_powers_of_ten(value, said):
     assert power_of_ten(value) == said
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_page_and_says_what_it_left_out(tmp_path, capsys):
     for one in suite():
         one.append_to(tmp_path / RESULTS)

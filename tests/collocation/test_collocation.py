@@ -298,6 +298,7 @@ def test_stationarity_of_an_optimum_by_the_referee() -> None:
     assert verdict.stationarity <= CERTIFIED
 
 
+@pytest.mark.slow
 def test_plans_of_a_loop_replay_to_the_last_bit(tmp_path: Path) -> None:
     """Shifted, rehearsed and recorded as the polynomials they are."""
     mpc = MPC(ocp=cart(), solver=Collocation(5, 3), dt=0.1)

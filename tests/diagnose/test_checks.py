@@ -400,6 +400,7 @@ def test_time_that_vanishes_and_time_without_end():
     assert _first(of.cart(horizon=FreeTime(2.0))) is Cause.ENDLESS_TIME
 
 
+@pytest.mark.slow
 def test_a_guess_that_is_too_short_is_no_time_without_end():
     """100 m at 1 m/s^2, there and at rest, take 20 s; the guess is 0.5 s."""
     assert _first(minimum_time(distance=100.0, horizon=FreeTime(0.5, 0.1, 1000.0))) is None

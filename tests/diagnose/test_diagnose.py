@@ -58,6 +58,7 @@ def test_text():
     assert "(x, y at t = 2.5 s)" in str(late)
 
 
+@pytest.mark.slow
 def test_degrees_explain_what_is_out_of_reach():
     ocp = of.pendulum(constraints=of.ends({"angle": 90.0, "rate": 0.0}), terminal_cost=0.0)
     causes = [f.cause for f in diagnose(ocp, intervals=10).findings]
@@ -65,6 +66,7 @@ def test_degrees_explain_what_is_out_of_reach():
     assert causes[1] in (Cause.OUT_OF_REACH, Cause.CONFLICT)
 
 
+@pytest.mark.slow
 def test_solution_that_lives_off_its_integrator():
     rough = MultipleShooting(6, integrator=Euler(), accuracy=100.0)
     solution = solve(of.oscillator(), rough).or_raise()

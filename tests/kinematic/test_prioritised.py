@@ -58,6 +58,7 @@ def tracking_error(gain: float, *, avoiding: bool, decoupled: bool = True) -> fl
     return float(run.errors["end effector"].max())
 
 
+@pytest.mark.slow
 def test_tracking_error_with_feedback() -> None:
     alone, among = (tracking_error(100.0, avoiding=avoiding) for avoiding in (False, True))
     assert alone < TRACKING

@@ -22,6 +22,7 @@ def rollout() -> Rollout:
     return mpc.run(Plant(ocp=cart(mass=1.2)), [1.0, 0.0], 0.3)
 
 
+@pytest.mark.slow
 def test_a_film_has_the_frames_that_were_asked_for(rollout: Rollout, tmp_path: Path) -> None:
     seen, told = [], []
 

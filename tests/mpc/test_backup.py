@@ -61,6 +61,7 @@ def test_references_shift_the_regulator():
     np.testing.assert_allclose(saturated_lqr(ocp)(ocp.start(), 0.0), expected, rtol=1e-8)
 
 
+@pytest.mark.slow
 @given(st.floats(-50, 50), st.floats(-50, 50))
 def test_the_regulator_keeps_the_bounds(position, velocity):
     u = saturated_lqr(mass(BOUND))(np.array([position, velocity]), 0.0)

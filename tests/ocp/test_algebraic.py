@@ -251,6 +251,7 @@ def test_it_is_certified() -> None:
     assert "as written" in str(certificate)
 
 
+@pytest.mark.slow
 def test_a_sound_problem_is_diagnosed_as_one() -> None:
     assert not diagnose(tank()).findings
 

@@ -203,6 +203,7 @@ def test_perfect_data_leave_nothing_and_that_is_no_fault():
     assert found.unknowns["rate"][0] == pytest.approx(0.8, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_parameter_and_a_constant_of_the_sensor_are_in_what_is_measured():
     offset = ca.SX.sym("offset")
     data = Measurement("amount", P * X + offset, TIMES, 3 * (2 * np.exp(-0.8 * TIMES)) + 0.4)

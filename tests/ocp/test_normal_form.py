@@ -210,6 +210,7 @@ def test_a_problem_is_forgotten_with_all_that_was_made_of_it(make):
     assert left() is None
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(unit=st.integers(-6, 6))
 def test_units_do_not_matter(unit):

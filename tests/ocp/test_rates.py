@@ -226,6 +226,7 @@ def test_the_sensitivity_is_the_slope_of_the_cost(ocp):
     assert program.run().sensitivity["last_input"][0] == pytest.approx(slope, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_beside_every_other_term_of_the_normal_form():
     k = ca.SX.sym("k")
     ocp = mass(

@@ -71,6 +71,7 @@ def test_a_run_that_begins_later_is_judged_by_its_own_clock() -> None:
     assert not found.status.is_success
 
 
+@pytest.mark.slow
 @given(
     at=st.floats(0.01, 0.99),
     width=st.floats(1e-6, 1e-3),

@@ -340,6 +340,7 @@ def test_a_force_that_keeps_a_length_is_no_free_control():
     assert not diagnose(swing).serious
 
 
+@pytest.mark.slow
 def test_a_constraint_whose_slope_vanishes_at_zero_is_no_contradiction():
     c, s = ca.SX.sym("c"), ca.SX.sym("s")
     ship = Model(name="ship", x=ca.vertcat(X, V), u=ca.vertcat(c, s), f=ca.vertcat(c, s))

@@ -279,6 +279,7 @@ def test_deterministic(backend: Backend) -> None:
     assert (one.cost, one.iterations, one.work) == (other.cost, other.iterations, other.work)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 12), st.sampled_from([van_der_pol, double_integrator_energy, tracker]))
 @settings(max_examples=12, deadline=None)
 def test_any_number_of_intervals(intervals: int, make: Callable[[], OCP]) -> None:

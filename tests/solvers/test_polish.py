@@ -79,6 +79,7 @@ def test_an_extremal_that_finer_steps_lose_is_inaccurate() -> None:
     assert extremal.residual < RESIDUAL
 
 
+@pytest.mark.slow
 def test_reaches_an_accuracy_from_an_inaccurate_start() -> None:
     case = case_called("hypersensitive")
     direct = held(case)

@@ -134,6 +134,7 @@ def test_a_program_of_every_solver_serves_two_threads(solver: Solver, ocp: OCP) 
         np.testing.assert_allclose(solution.u, want.u, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_two_threads_build_and_judge_one_problem() -> None:
     """What is derived once is derived by whoever comes first; the referee remembers for both."""
     for _ in range(5):
