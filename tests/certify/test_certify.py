@@ -56,6 +56,7 @@ def test_a_certificate_is_plain_data(energy):
     assert all(isinstance(check["evidence"], str) for check in found["checks"])
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("known", QUICKER, ids=lambda known: known.name)
 def test_the_textbook_is_certified(known):
