@@ -36,31 +36,19 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     Of those marked ``over_library`` the others run in ``make nightly`` only; of those marked
     ``many`` they are slow: ``make quick`` leaves them out, ``make test`` does not. Which ones is
-    always the same.
+    always the same. Of several poses of one case another third runs each, since the number of
+    cases is no multiple of three.
     """
-    kept, left = [], []
-    for item, is_chosen in _with_choice(items):
-        if item.get_closest_marker("many") and not is_chosen:
-            item.add_marker(pytest.mark.slow)
-        if item.get_closest_marker("over_library") and not is_chosen:
-            left.append(item)
-        else:
-            kept.append(item)
-    if left and not config.getoption("--nightly"):
-        config.hook.pytest_deselected(items=left)
-        items[:] = kept
-
-
-def _with_choice(items: list[pytest.Item]) -> list[tuple[pytest.Item, bool]]:
-    """Return every item, and whether it is the one of three cases of its test.
-
-    It is the first of the first three, the last of the next, the middle one of those: where a case
-    comes in three ways, or in two, all of them are among what is taken.
-    """
-    counts, found = Counter[str](), []
+    counts, kept, left = Counter[str](), [], []
     for item in items:
         name = item.nodeid.split("[")[0]
         k = counts[name]
-        found.append((item, (k + k // _SHARE) % _SHARE == 0))
         counts[name] += 1
-    return found
+        # First, last, middle of three: where a case comes in two or three ways, each is taken.
+        if item.get_closest_marker("many") and (k + k // _SHARE) % _SHARE:
+            item.add_marker(pytest.mark.slow)
+        is_left = item.get_closest_marker("over_library") and k % _SHARE
+        (left if is_left else kept).append(item)
+    if left and not config.getoption("--nightly"):
+        config.hook.pytest_deselected(items=left)
+        items[:] = kept
