@@ -157,6 +157,7 @@ def test_effort_is_checked(wrong):
         CertifyOptions(**wrong)
 
 
+@pytest.mark.slow
 def test_what_no_grid_solves_is_said():
     """The end is out of reach within the bounds of the control."""
     ocp = integrator(control_bounds=Box([-0.5], [0.5]))

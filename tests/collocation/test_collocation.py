@@ -206,6 +206,7 @@ def test_what_holds_where(points: Family) -> None:
 meshes = st.lists(st.tuples(st.floats(0.1, 1.0), st.integers(2, 5)), min_size=1, max_size=4)
 
 
+@pytest.mark.slow
 @given(meshes, st.sampled_from(["radau", "gauss"]))
 @settings(max_examples=10, deadline=None)
 def test_energy_is_exact_on_any_mesh(cells: list[tuple[float, int]], points: Family) -> None:

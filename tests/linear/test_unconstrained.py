@@ -147,6 +147,7 @@ def test_cost_to_go_of_the_thesis_plants(plant, cost):
     assert np.ones(3) @ program.P[0] @ np.ones(3) == pytest.approx(cost, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_plain_batch_loses_the_unstable_plant_and_says_so():
     plain = Batch(prestabilise=False)
     good = solve(thesis_regulator(stable_plant(), 100), plain)

@@ -36,6 +36,7 @@ def test_no_fault_gets_through(subject: str, steps: int) -> None:
     assert report.replayed > 0.05 * steps
 
 
+@pytest.mark.slow
 def test_many_steps_are_replayed_with_one_controller(tmp_path: Path) -> None:
     mpc = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1)
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:

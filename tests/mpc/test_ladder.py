@@ -146,6 +146,7 @@ def test_what_is_not_measured_is_no_failure_of_the_plan() -> None:
     assert [guess is None for guess in watched.seen] == [True, False]
 
 
+@pytest.mark.slow
 def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
     def used(solver: Solver) -> Any:
         mpc = MPC(ocp=cart(), solver=solver, dt=DT, compiled=False)
@@ -194,6 +195,7 @@ def test_who_changes_an_input_changes_no_plan() -> None:
     np.testing.assert_array_equal(decision.plan.u[0], first)
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
     good = loop(controller({0.3: becomes(Status.ITERATION_LIMIT)}))
     assert good.sources[3] is InputSource.FEASIBLE

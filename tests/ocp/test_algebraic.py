@@ -256,6 +256,7 @@ def test_a_sound_problem_is_diagnosed_as_one() -> None:
     assert not diagnose(tank()).findings
 
 
+@pytest.mark.slow
 def test_it_is_described_saved_and_copied(tmp_path) -> None:
     ocp = tank()
     assert "0 = (log(z)-x)" in ocp.describe()

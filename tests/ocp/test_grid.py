@@ -209,6 +209,7 @@ def test_a_discrete_model_has_a_grid_of_its_own():
 # -- around it ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_loop_plans_on_a_grid_that_grows():
     ocp = vdp(control_bounds=Box(-1, 1), horizon=4.0)
     grid = Grid.of_times([0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.8, 2.6, 4.0])

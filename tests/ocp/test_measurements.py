@@ -141,6 +141,7 @@ def by_hand(x0, intervals: int = 200) -> float:
     return float(opti.solve().value(cost))
 
 
+@pytest.mark.slow
 def test_the_optimum_is_that_of_a_program_with_squares_at_its_nodes():
     """The integral of the change of a square is that change to the fourth order of the grid."""
     found = solve(cart(), MultipleShooting(200)).or_raise()
@@ -308,6 +309,7 @@ def test_a_loop_has_no_data():
         MPC(ocp=cart(), solver=MultipleShooting(20), dt=0.1)
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=8, unique=True))
 def test_data_at_any_instants_are_an_integral(times):

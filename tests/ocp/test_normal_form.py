@@ -151,6 +151,7 @@ def test_they_are_certified(ocp):
     assert certificate.cost == pytest.approx(values[ocp.name], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_what_takes_a_solution_takes_these():
     ocp = geared()
     rough = solve(ocp, MultipleShooting(10))

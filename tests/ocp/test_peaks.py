@@ -151,6 +151,7 @@ def test_files_words_and_the_other_tools(tmp_path):
         IndirectShooting(5).build(ocp)
 
 
+@pytest.mark.slow
 def test_a_loop_keeps_the_peak_of_its_horizon_low():
     ocp = mass(
         constraints=(),

@@ -357,6 +357,7 @@ def test_it_is_kept_in_files_copies_and_words(tmp_path):
     assert found.plot().axes
 
 
+@pytest.mark.slow
 def test_the_other_tools_speak_of_the_rate():
     tight = mass(rates=(Rate(F, -1, 1),))
     assert "rate of force" in str(diagnose(tight))

@@ -93,6 +93,7 @@ class TestDirect:
         assert found.slack["arrival"][0] == pytest.approx(left, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_two_transcriptions_agree_with_the_shape_of_the_optimum():
     direct = solve(transfer(Soft(10)), MultipleShooting(400)).or_raise()
     assert evaluate(direct).cost == pytest.approx(

@@ -54,6 +54,7 @@ def test_a_pulse_between_the_nodes_is_no_secret(solver, pulse) -> None:
         assert found.cost == pytest.approx(verdict.cost, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_what_a_pulse_costs_is_known_to_the_referee() -> None:
     """Without control x = 0.5 from the pulse on, but for 1/3 of it while it lasts."""
     found = solve(

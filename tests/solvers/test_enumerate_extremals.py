@@ -13,6 +13,7 @@ from tests.solvers.test_reverse_shooting import SAME_COST, bare
 from tests.tolerances import GAP, RESIDUAL
 
 
+@pytest.mark.slow
 def test_without_obstacle_there_is_one_extremal() -> None:
     ocp = bare()
     found = enumerate_extremals(ocp)
@@ -108,6 +109,7 @@ def test_refuses_what_it_cannot_enumerate() -> None:
         enumerate_extremals(ocp, keep=0)
 
 
+@pytest.mark.slow
 def test_roots_that_newton_does_not_confirm_are_counted() -> None:
     hasty = IndirectShooting(segments=15, tolerance=1e-300)
     found = enumerate_extremals(bare(), solver=hasty)

@@ -139,6 +139,7 @@ def test_manifold_start(name: str) -> None:
         assert np.abs(along).max() <= accuracy * np.abs(answer.costate[0]).max()
 
 
+@pytest.mark.slow
 def test_from_the_costates_of_the_thesis() -> None:
     """psi(t0) = (0, 10, -10) in our sign: plain Newton finds the optimum, the damped one stalls."""
     guess = Guess(costate=[0.0, 10.0, -10.0])

@@ -261,6 +261,7 @@ def test_names_and_sizes_of_the_user_are_no_obstacle() -> None:
     assert solve(sized, MultipleShooting(50)).cost == pytest.approx(FUEL, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_what_a_held_slack_cannot_follow_stays_as_it_is():
     """A slack that is held misses the integral of abs(x), so only Collocation replaces it."""
     asked = ride(0.0, ca.fabs(X - FAR) + 1e-2 * U**2)

@@ -121,6 +121,7 @@ def test_the_change_under_half_the_step_is_predicted(name: str) -> None:
     assert 0.0 < predicted.state < 1e-5
 
 
+@pytest.mark.slow
 def test_curvature_is_tested_once(monkeypatch: pytest.MonkeyPatch) -> None:
     tested, test = [], IndirectShootingProgram.second_order
 

@@ -65,6 +65,7 @@ def test_agrees_with_direct_multiple_shooting(boundary: Boundary) -> None:
     assert polish(reverse).status is Status.SOLVED
 
 
+@pytest.mark.slow
 def test_types_2_and_3_are_the_same_and_meet_transversality() -> None:
     ocp = bare(free_start=True)
     second, third = (solve(ocp, ReverseShooting(boundary=b)).or_raise() for b in (2, 3))
