@@ -8,12 +8,15 @@ BIN   := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PIP   := -m pip --disable-pip-version-check
 
-PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=$(WORKERS)
+# A worker takes tests that stand together, which share what they build; one that is idle takes some.
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses=$(WORKERS) --dist worksteal
 ifeq ($(WORKERS),0)
 PYTEST := $(BIN)/python -m pytest -n 0
 endif
 
 export MPLBACKEND ?= Agg
+# Tests start many interpreters: without bytecode each would compile all it imports again.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -32,7 +35,8 @@ $(STAMP): pyproject.toml constraints.txt
 bench: $(STAMP) ## run the main job: all methods on the arm, a table and a picture
 	$(BIN)/python -m benchmarks bench
 
-test: lint docs ## all checks and tests
+test: $(STAMP) ## all checks and tests
+	$(MAKE) --no-print-directory -j2 lint docs
 	$(PYTEST) --cov --cov-report=term
 
 lint: $(STAMP) ## ruff, pyright, the dependency law

@@ -35,6 +35,7 @@ def test_there_are_twenty_answers() -> None:
     assert all(_code(section) for section in SECTIONS.values())
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("heading", [name for name in SECTIONS if name])
 def test_it_runs(heading: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # one of them writes a file

@@ -36,6 +36,7 @@ def test_the_time_of_a_step_is_all_in_this_process():
     assert not any(getattr(s, "time_limit", 0.0) is None for s in stagewise().values())
 
 
+@pytest.mark.slow
 def test_the_drivers_own_time_is_told():
     found = driver_overhead(count=5)
     assert [line.solver for line in found][::3] == ["stand-in", "fatrop"]

@@ -24,6 +24,7 @@ def closest_along(scenario: ArmScenario, theta: np.ndarray) -> float:
     return float(np.array(closest.map(len(theta))(theta.T)).min())
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", ["arm-001", "arm-011", "arm-022"])
 def test_a_motion_that_exists_is_possible(name: str) -> None:
     scenario, truth = arm_scenario(name), evaluate(soft_optimum(name)).truth

@@ -69,6 +69,7 @@ def test_bad_words_end_with_a_message(arguments, capsys):
     assert capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn(tmp_path):
     file = bench_picture("arm-003-sum", tmp_path)
     assert file.read_bytes().startswith(b"\x89PNG")

@@ -83,6 +83,7 @@ def test_an_unreachable_scheduler_is_named_and_nothing_lost(tmp_path, address):
         sweep(SMALL[:1], tmp_path, resume=False, execution=execution, progress=False)
 
 
+@pytest.mark.slow
 def test_the_command_line_says_so_too(tmp_path, capsys):
     words = ["run", "--case", QUICK.name, "--solver", DIRECT[0], "--executor", "dask"]
     assert main([*words, "--scheduler", NOBODY, "--out", str(tmp_path)]) == 2

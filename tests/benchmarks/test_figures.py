@@ -56,6 +56,7 @@ def draw(number: str, out: Path) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("number", QUICK)
 def test_quick_figures_are_drawn(number, drawn):
     assert drawn(number)
@@ -117,6 +118,7 @@ def test_a_smaller_interval_is_smoother_at_the_same_real_time_horizon(drawn):
     assert np.abs(np.diff(late[1])).max() < 0.5 * np.abs(np.diff(late[0])).max()
 
 
+@pytest.mark.slow
 def test_the_command_line_draws_what_it_is_told(tmp_path, capsys):
     assert main(["figures", "2.9", "2.7", "2.9", "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr().out

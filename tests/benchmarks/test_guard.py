@@ -15,6 +15,7 @@ def group(*methods: str, limit: float = 30.0) -> Group:
     return Group(tuple(tasks), limit, "tests.benchmarks.faulty_child")
 
 
+@pytest.mark.slow
 def test_a_crash_costs_its_row_and_not_the_next():
     first, second = run_group(group("segfaults", "good"))
     assert (first.status, second.solved) == (CRASHED, True)

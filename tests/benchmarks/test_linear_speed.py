@@ -8,6 +8,7 @@ from benchmarks.questions.greedy_gap import PROBLEMS, gap
 from benchmarks.speed.linear import Growth, situations
 
 
+@pytest.mark.slow
 def test_speed_prints_growth(capsys):
     assert main(["speed", "--horizons", "5", "10", "--count", "3"]) == 0
     shown = capsys.readouterr().out
@@ -33,6 +34,7 @@ def test_exponent_is_the_slope_of_the_long_horizons():
 RATIOS = {"stable plant 2.50": 26.66, "mass 2.92": 14.07, "Van der Pol": 2.01}
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_greedy_costs_more_on_every_plant(name):
     found = gap(name)

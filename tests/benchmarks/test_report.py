@@ -133,11 +133,17 @@ NAMES = [
     "ünïcödé",
 ]
 WHITELISTED = re.compile(r"[A-Za-z0-9_-]+")
-SCRIPTS = len(Page(report_page([row()], [], "A report")).all("script"))
 
 
+@pytest.fixture(scope="module")
+def scripts() -> int:
+    """How many scripts a page has."""
+    return len(Page(report_page([row()], [], "A report")).all("script"))
+
+
+@pytest.mark.many
 @pytest.mark.parametrize("name", NAMES)
-def test_no_name_is_more_than_text(name):
+def test_no_name_is_more_than_text(name, scripts):
     named = {"suite": name, "case": name, "message": name, "worst": name, "status": name}
     rows = [row(**named, solver=solver, settings=f"{name}(intervals={n})", intervals=n, gap=0.1 / n,
                 violation=1e-3, machine={name: name}, versions={name: name}, when=name or WHEN)
@@ -154,9 +160,10 @@ def test_no_name_is_more_than_text(name):
     addresses = [a["href"] or "" for _, a in page.tags if "href" in a]
     assert {address.partition(":")[0] for address in addresses if address[0] != "#"} == {"data"}
     assert {address[1:] for address in addresses if address[0] == "#"} <= set(ids)
-    assert len(page.all("script")) == SCRIPTS
+    assert len(page.all("script")) == scripts
 
 
+@pytest.mark.slow
 def test_suites_that_differ_in_signs_only_have_addresses_of_their_own():
     rows = [row(suite=name) for name in ("a b", "a-b", "a?b", "a-b-2", "???", "!", "x-figure_1")]
     names = [part.name for part in parts_of(rows)]
@@ -188,6 +195,7 @@ def test_the_page_has_its_own_colours(text):
     assert not re.search(r"#0[123][0-9a-f]{4}\b", drawings)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "rows",
     [
@@ -258,6 +266,7 @@ def test_powers_of_ten(value, said):
     assert power_of_ten(value) == said
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_page_and_says_what_it_left_out(tmp_path, capsys):
     for one in suite():
         one.append_to(tmp_path / RESULTS)

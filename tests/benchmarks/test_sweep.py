@@ -58,6 +58,7 @@ def first_line(swept: Path, folder: Path, then: str = "") -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_row_has_what_the_readme_promises(swept):
     rows = sweep(SMALL, swept, resume=True, progress=False)
     assert [(row.case, row.solver) for row in rows] == [(t.case, t.method) for t in SMALL]
@@ -78,6 +79,7 @@ def test_resume_recomputes_nothing_and_a_damaged_line_costs_its_row_only(tmp_pat
     assert len(file.read_text().splitlines()) == len(SMALL) + 1
 
 
+@pytest.mark.slow
 def test_without_resume_rows_are_computed_again_and_the_newest_counts(tmp_path, swept):
     file = first_line(swept, tmp_path)
     (old,) = read_rows(file)
@@ -87,6 +89,7 @@ def test_without_resume_rows_are_computed_again_and_the_newest_counts(tmp_path, 
     assert row != old
 
 
+@pytest.mark.slow
 def test_what_was_lost_is_computed_again_only_where_asked(tmp_path):
     lost = Row.lost(SMALL[0], CRASHED, "a test", 1.0)
     lost.append_to(tmp_path / RESULTS)
@@ -95,6 +98,7 @@ def test_what_was_lost_is_computed_again_only_where_asked(tmp_path):
     assert row.solved
 
 
+@pytest.mark.slow
 def test_a_row_is_written_before_the_next_is_computed(tmp_path):
     """The second method never ends; the first one's row is in the file while it hangs."""
     told: list[Row] = []

@@ -66,6 +66,7 @@ CLOSED = [
 ]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("build", "optimum", "kind"), CLOSED)
 def test_closed_forms(build, optimum, kind):
     """Where the control is singular on an arc, the direct method speaks."""
@@ -132,6 +133,7 @@ def two_pushes(bounds: Box, *path: Constraint, x: ca.SX, u: ca.SX) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("kind", ["box", "path"])
 def test_an_equation_is_one_law_whose_multiplier_may_have_any_sign(kind):
     x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)

@@ -56,6 +56,7 @@ def test_a_certificate_is_plain_data(energy):
     assert all(isinstance(check["evidence"], str) for check in found["checks"])
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("known", QUICKER, ids=lambda known: known.name)
 def test_the_textbook_is_certified(known):
@@ -156,6 +157,7 @@ def test_effort_is_checked(wrong):
         CertifyOptions(**wrong)
 
 
+@pytest.mark.slow
 def test_what_no_grid_solves_is_said():
     """The end is out of reach within the bounds of the control."""
     ocp = integrator(control_bounds=Box([-0.5], [0.5]))
@@ -164,6 +166,7 @@ def test_what_no_grid_solves_is_said():
         certify(start, QUICK)
 
 
+@pytest.mark.slow
 def test_stiff_dynamics_are_certified_by_two_kinds_of_collocation() -> None:
     """No explicit grid follows a lag of 0.1 ms over a second."""
     x, y, u = (ca.SX.sym(name) for name in "xyu")

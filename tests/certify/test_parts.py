@@ -107,6 +107,7 @@ BANG_BANG = (
 )
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("intervals", [10, 15])
 @pytest.mark.parametrize("name", BANG_BANG)

@@ -85,6 +85,7 @@ COARSE = {
 }
 
 
+@pytest.mark.many
 @both
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in PROBLEMS]
@@ -205,6 +206,7 @@ def test_what_holds_where(points: Family) -> None:
 meshes = st.lists(st.tuples(st.floats(0.1, 1.0), st.integers(2, 5)), min_size=1, max_size=4)
 
 
+@pytest.mark.slow
 @given(meshes, st.sampled_from(["radau", "gauss"]))
 @settings(max_examples=10, deadline=None)
 def test_energy_is_exact_on_any_mesh(cells: list[tuple[float, int]], points: Family) -> None:
@@ -297,6 +299,7 @@ def test_stationarity_of_an_optimum_by_the_referee() -> None:
     assert verdict.stationarity <= CERTIFIED
 
 
+@pytest.mark.slow
 def test_plans_of_a_loop_replay_to_the_last_bit(tmp_path: Path) -> None:
     """Shifted, rehearsed and recorded as the polynomials they are."""
     mpc = MPC(ocp=cart(), solver=Collocation(5, 3), dt=0.1)

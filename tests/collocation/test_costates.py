@@ -33,6 +33,7 @@ def errors(points: Family, degree: int, intervals: int, exact: Solution) -> list
     ]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("points", "degree", "counts", "order"),
     [
@@ -64,6 +65,7 @@ def test_high_degrees_reach_the_optimum(points: Family, degree: int, exact: Solu
     assert at_points <= 1e-5
 
 
+@pytest.mark.many
 @both
 @pytest.mark.parametrize("make", [van_der_pol, tracker, timed_transfer])
 def test_costates_are_slopes_of_the_optimal_cost(make, points: Family) -> None:

@@ -25,6 +25,7 @@ from tests.tolerances import CERTIFIED, ROUNDING
 both = pytest.mark.parametrize("points", ["radau", "gauss"])
 
 
+@pytest.mark.over_library
 @both
 @pytest.mark.parametrize(
     ("make", "reference"),
@@ -49,6 +50,7 @@ def test_certified_optima(make: Callable[[], OCP], reference: float, points: Fam
     assert found.rounds[-1].error <= 1e-8 < found.rounds[0].error
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm-001", "arm-002", "arm-003", "arm-004"])
 def test_the_arm_agrees_with_its_extremal(name: str) -> None:

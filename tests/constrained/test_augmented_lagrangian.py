@@ -85,6 +85,7 @@ def test_history_of_the_rounds() -> None:
     assert history["violation"][-1] <= 1e-6 < history["violation"][0]
 
 
+@pytest.mark.slow
 def test_terminal_equation_for_schuetz() -> None:
     """From 0 to 1 in 1 s with u = 1: cost 1; an end that Schuetz cannot take by itself."""
     ocp = point(constraints=ends(1.0))

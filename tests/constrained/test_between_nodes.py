@@ -25,6 +25,7 @@ from tests.constrained.test_augmented_lagrangian import ceiling_cost, under_a_ce
 from tests.solvers.problems import point
 
 
+@pytest.mark.slow
 def test_nodes_alone_are_not_enough_and_margins_are() -> None:
     name = "arm-003"
     ocp = arm_scenario(name).ocp(clearance=required_clearance(name, "beyond"))

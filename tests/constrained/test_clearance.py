@@ -37,6 +37,7 @@ def test_clearance_and_path_are_kept_by_all(name: str) -> None:
     assert all(claim.holds for claim in claims_of(rows))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: m.name)
 def test_a_start_too_close_is_infeasible(method) -> None:
     row = row_of("arm-001", method)

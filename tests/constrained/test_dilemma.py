@@ -25,6 +25,7 @@ def test_a_low_price_is_paid(solver: Solver) -> None:
     assert violation_of(solution) > 0.05
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [Schuetz(), Schuetz.sound(), IndirectShooting(steps=150), MultipleShooting(75)],

@@ -9,6 +9,7 @@ from ocp import OCP, Box, Model, solve
 from solvers import Collocation, MultipleShooting, diagnose, refine_mesh
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda m: m.name)
 def test_advice_leads_on(mistake: Mistake):

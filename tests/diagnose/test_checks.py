@@ -393,17 +393,20 @@ def test_a_speed_limit_is_a_matter_of_time():
     assert float(told[1]) == pytest.approx(2.58, rel=0.01)
 
 
+@pytest.mark.slow
 def test_time_that_vanishes_and_time_without_end():
     shrinking = of.fastest(horizon=FreeTime(2.0), constraints=of.ends({"position": 0.0}))
     assert _first(shrinking) is Cause.VANISHING_TIME
     assert _first(of.cart(horizon=FreeTime(2.0))) is Cause.ENDLESS_TIME
 
 
+@pytest.mark.slow
 def test_a_guess_that_is_too_short_is_no_time_without_end():
     """100 m at 1 m/s^2, there and at rest, take 20 s; the guess is 0.5 s."""
     assert _first(minimum_time(distance=100.0, horizon=FreeTime(0.5, 0.1, 1000.0))) is None
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("unit", [1.0, 1e-6])
 def test_from_one_bound_to_the_other_is_a_decision_in_any_unit(unit):
     causes = {f.cause for f in diagnose(minimum_time(unit=unit)).findings}
@@ -443,6 +446,7 @@ def minimum_time(
     )
 
 
+@pytest.mark.slow
 def test_idle_optimum_and_idle_constraint():
     assert _first(of.servo(running_cost=lambda s: s.spot**2 + s.voltage**2)) is Cause.UNUSED
     # The start is the goal.

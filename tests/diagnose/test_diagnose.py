@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from benchmarks.__main__ import main
 from benchmarks.mistakes import MISTAKES, SOUND
 from benchmarks.mistakes import problems as of
-from benchmarks.mistakes.judge import GOAL, judged, share
+from benchmarks.mistakes.judge import GOAL, judged
 from ocp import Box, Euler, ProblemError, solve
 from solvers import Diagnosis, Finding, MultipleShooting, diagnose, polish
 from solvers.diagnose.cause import Cause
@@ -58,6 +58,7 @@ def test_text():
     assert "(x, y at t = 2.5 s)" in str(late)
 
 
+@pytest.mark.slow
 def test_degrees_explain_what_is_out_of_reach():
     ocp = of.pendulum(constraints=of.ends({"angle": 90.0, "rate": 0.0}), terminal_cost=0.0)
     causes = [f.cause for f in diagnose(ocp, intervals=10).findings]
@@ -65,6 +66,7 @@ def test_degrees_explain_what_is_out_of_reach():
     assert causes[1] in (Cause.OUT_OF_REACH, Cause.CONFLICT)
 
 
+@pytest.mark.slow
 def test_solution_that_lives_off_its_integrator():
     rough = MultipleShooting(6, integrator=Euler(), accuracy=100.0)
     solution = solve(of.oscillator(), rough).or_raise()
@@ -85,6 +87,7 @@ def test_failed_solution():
     assert "velocity" in first.where
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("build", [pendulum, lag, energy])
 def test_signals_time_and_discrete_time_are_no_mistakes(build):
     assert not diagnose(build(), intervals=30).serious
@@ -140,15 +143,24 @@ def test_reach_is_decided_as_by_hand(seconds, ratio):
 
 
 @pytest.mark.slow
-def test_the_corpus_is_diagnosed():
+@pytest.mark.over_library
+@pytest.mark.parametrize("third", range(3))
+def test_the_corpus_is_diagnosed(third):
     """Each of its problems once; the numbers are those of docs/diagnose.md."""
-    mistakes = list(judged(MISTAKES))
-    assert share(mistakes) >= GOAL
-    assert share([v for v in mistakes if v.entry.held_out]) >= GOAL
-    assert [v.entry.name for v in mistakes if not v.is_right] == list(MISSED)
+    entries = MISTAKES[third::3]
+    missed = [v.entry.name for v in judged(entries) if not v.is_right]
+    assert missed == [entry.name for entry in entries if entry.name in MISSED]
+
+
+def test_what_is_missed_is_little():
+    assert set(MISSED) <= {m.name for m in MISTAKES}
+    for entries in (MISTAKES, [m for m in MISTAKES if m.held_out]):
+        assert sum(m.name not in MISSED for m in entries) >= GOAL * len(entries)
 
 
 @pytest.mark.slow
-def test_sound_problems_raise_no_alarm():
-    alarms = [v.entry.name for v in judged(SOUND) if not v.is_right]
+@pytest.mark.over_library
+@pytest.mark.parametrize("third", range(3))
+def test_sound_problems_raise_no_alarm(third):
+    alarms = [v.entry.name for v in judged(SOUND[third::3]) if not v.is_right]
     assert alarms == []

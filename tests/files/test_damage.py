@@ -45,6 +45,7 @@ def example(request, tmp_path) -> tuple[Kind, Path, bytes, Any]:
     return kind, file, file.read_bytes(), whole
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("number", FLIPS)
 def test_a_flipped_bit_is_never_another_value(example, number):
     kind, file, content, whole = example

@@ -21,7 +21,7 @@ from tests.files.examples import function, problem, row, solution
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there is no SIGKILL")
 needs_compiler = pytest.mark.skipif(not Compiler().found, reason="no compiler on this machine")
-KILLS = pytest.mark.parametrize("number", [10, pytest.param(50, marks=pytest.mark.slow)])
+KILLS = pytest.mark.parametrize("number", [4, pytest.param(50, marks=pytest.mark.slow)])
 LONGEST = 0.06  # after what it says for the first time [s]
 
 # Its processes begin with everything imported.

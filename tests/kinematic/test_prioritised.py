@@ -58,6 +58,7 @@ def tracking_error(gain: float, *, avoiding: bool, decoupled: bool = True) -> fl
     return float(run.errors["end effector"].max())
 
 
+@pytest.mark.slow
 def test_tracking_error_with_feedback() -> None:
     alone, among = (tracking_error(100.0, avoiding=avoiding) for avoiding in (False, True))
     assert alone < TRACKING
@@ -84,6 +85,7 @@ def test_first_task_is_independent_of_the_second(q: list[float], speed: float) -
     np.testing.assert_allclose(j @ dq, j @ alone.velocity(q), atol=slack)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("damping", [Damped(0.05), Filtered(0.05, 0.1)])
 @pytest.mark.parametrize("decoupled", [True, False])
 def test_velocities_stay_bounded_through_singular_configurations(
@@ -149,6 +151,7 @@ def test_position_and_orientation_together() -> None:
     assert run.errors["orientation"][-1] < 1e-2 < run.errors["orientation"][0]
 
 
+@pytest.mark.slow
 def test_obstacles_are_avoided_several_and_moving() -> None:
     still = Disc([1.75, 1.45], 0.15)
     moving = Disc([1.0, 0.25], 0.13).moving([0.0, 0.5], T)
@@ -183,6 +186,7 @@ def test_a_moving_obstacle_is_met_with_its_own_speed() -> None:
     assert np.abs(velocities[1] - velocities[0]).max() > 0.01
 
 
+@pytest.mark.slow
 def test_joint_limit_as_an_obstacle() -> None:
     limit = START[1] - 0.05
     guard = repel("limit", q=Q, t=T, distance=Q[1] - limit, repulsion=Repulsion(0.5, 0.1, 0.2))

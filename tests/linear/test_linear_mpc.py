@@ -53,6 +53,7 @@ def needs(backend: str) -> None:
 # -- the thesis' example ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_constraints_hold_at_every_step_and_short_horizons_are_myopic():
     peaks = {0: peak(finite())}
     for steps in (5, 10, 20, 40):
@@ -71,6 +72,7 @@ def test_a_reference_without_velocity_turns_the_order_round():
     assert peaks == pytest.approx((7.1, 10.0), abs=0.1)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("steps", "dt"), [(10, 0.01), (20, 0.01), (25, 0.01), (40, 0.02)])
 def test_a_finely_sampled_bound_does_not_make_the_active_rows_cycle(form, steps, dt):
@@ -224,6 +226,7 @@ def solved_by_osqp(seed: int) -> tuple[OCP, Solution]:
     return ocp, solve(ocp, LinearMPC(form="condensed"))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_backends_agree_on_random_feasible_problems(backend):
     needs(backend)

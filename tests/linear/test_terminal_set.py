@@ -81,6 +81,7 @@ def test_outside_it_the_regulator_breaks_a_constraint_some_day():
     assert broken > 100
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("form", ["sparse", "condensed"])
 def test_a_short_horizon_stays_feasible(form):
     """From wherever the first program is solvable all later ones are, and the mass comes home."""

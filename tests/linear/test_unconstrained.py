@@ -74,6 +74,7 @@ def dense_optimum(ocp: OCP) -> tuple[np.ndarray, np.ndarray]:
     return np.vstack([stages[:, :n], z[steps * (n + m) :]]), stages[:, n:]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("ocp", PROBLEMS, ids=lambda p: p.name)
 @pytest.mark.parametrize("solver", SOLVERS, ids=repr)
 def test_all_solvers_agree_on_the_same_problem(solver, ocp):
@@ -94,6 +95,7 @@ GRID = GridDP(
 )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("solver", [*SOLVERS, GRID], ids=lambda s: type(s).__name__)
 def test_one_description_five_solvers(solver):
     """The plant 2.92; what a table is allowed is its own estimate of its error."""
@@ -117,6 +119,7 @@ def test_one_description_five_solvers(solver):
     np.testing.assert_allclose(solution.u, optimum.u, atol=np.sqrt(allowed / weight))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("ocp", PROBLEMS, ids=lambda p: p.name)
 def test_riccati_is_the_solution_of_the_dense_kkt_system(ocp):
     x, u = dense_optimum(ocp)
@@ -125,6 +128,7 @@ def test_riccati_is_the_solution_of_the_dense_kkt_system(ocp):
     np.testing.assert_allclose(solution.x, x, atol=1e-9)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("steps", [10, 20, 50, 100, 200])
 @pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
 def test_batch_is_riccati_on_any_horizon(plant, steps):
@@ -143,6 +147,7 @@ def test_cost_to_go_of_the_thesis_plants(plant, cost):
     assert np.ones(3) @ program.P[0] @ np.ones(3) == pytest.approx(cost, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_plain_batch_loses_the_unstable_plant_and_says_so():
     plain = Batch(prestabilise=False)
     good = solve(thesis_regulator(stable_plant(), 100), plain)

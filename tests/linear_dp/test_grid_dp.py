@@ -44,6 +44,7 @@ def test_error_falls_with_the_square_of_the_cell():
     assert np.all((orders > 1.5) & (orders < 2.5))
 
 
+@pytest.mark.slow
 def test_unstable_mass_against_multiple_shooting():
     grid = GridDP(states=(161, Axis(-6.0, 6.0, 161)), controls=61).build(unstable_mass())
     direct = MultipleShooting().build(unstable_mass())
@@ -145,6 +146,7 @@ def test_a_kinked_cost_keeps_to_the_grid_of_controls():
     assert np.abs(solution.u * 10 - np.round(solution.u * 10)).max() <= ROUNDING
 
 
+@pytest.mark.slow
 def test_two_controls_and_three_states():
     x, u = ca.SX.sym("x", 3), ca.SX.sym("u", 2)
     f = ca.vertcat(0.5 * x[0] + u[0], 0.5 * x[1] + u[1], 0.5 * x[2] + x[0] * x[1])

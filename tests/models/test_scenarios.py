@@ -9,6 +9,7 @@ from ocp import ProblemError
 DIFFICULTIES = ("ordinary", "tight", "low gain", "infeasible")
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 def test_same_arguments_same_scenarios(difficulty: str) -> None:
     first = random_scenarios(4, 3, seed=7, difficulty=difficulty)  # type: ignore[arg-type]
@@ -18,6 +19,7 @@ def test_same_arguments_same_scenarios(difficulty: str) -> None:
     assert len({s.name for s in first}) == 3
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("links", range(3, 13))
 def test_every_number_of_links_gives_well_posed_problems(links: int) -> None:
     (scenario,) = random_scenarios(links, 1, seed=0)

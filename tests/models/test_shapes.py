@@ -73,6 +73,7 @@ def test_polygon_against_brute_force(
     assert signed(corners, link) == pytest.approx(brute_force(corners, link), abs=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(ends, ends)
 def test_capsule_against_brute_force(core: np.ndarray, link: np.ndarray) -> None:

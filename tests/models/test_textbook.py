@@ -72,6 +72,7 @@ def test_bryson_denham_optimum_is_4() -> None:
     np.testing.assert_allclose(np.asarray(ocp.state_bounds.upper), [1.0 / 9.0, np.inf])
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("build", "reference"),
     [(van_der_pol, 1.047806908220), (rayleigh, 29.376079655945), (hypersensitive, 1.330806904945)],

@@ -22,6 +22,7 @@ def rollout() -> Rollout:
     return mpc.run(Plant(ocp=cart(mass=1.2)), [1.0, 0.0], 0.3)
 
 
+@pytest.mark.slow
 def test_a_film_has_the_frames_that_were_asked_for(rollout: Rollout, tmp_path: Path) -> None:
     seen, told = [], []
 
@@ -43,6 +44,7 @@ def test_a_film_has_the_frames_that_were_asked_for(rollout: Rollout, tmp_path: P
     np.testing.assert_allclose(seen[-1][1], rollout.x[-1])
 
 
+@pytest.mark.slow
 def test_a_loaded_rollout_and_a_law_have_no_plans(rollout: Rollout, tmp_path: Path) -> None:
     loaded = Rollout.load(rollout.save(tmp_path / "loop"), rollout.plant)
     law = closed_loop(

@@ -59,6 +59,7 @@ def test_rows_are_written_and_compared(tmp_path) -> None:
     assert stays_below(mine, row(0.0, 0.5), part=False) is None
 
 
+@pytest.mark.slow
 def test_the_mass_stays_behind_its_bound() -> None:
     rollout = receding(20, bounded=True).or_raise()
     assert set(rollout.sources) == {InputSource.OPTIMAL}

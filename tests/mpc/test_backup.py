@@ -61,6 +61,7 @@ def test_references_shift_the_regulator():
     np.testing.assert_allclose(saturated_lqr(ocp)(ocp.start(), 0.0), expected, rtol=1e-8)
 
 
+@pytest.mark.slow
 @given(st.floats(-50, 50), st.floats(-50, 50))
 def test_the_regulator_keeps_the_bounds(position, velocity):
     u = saturated_lqr(mass(BOUND))(np.array([position, velocity]), 0.0)
@@ -89,6 +90,7 @@ def test_the_arm_descends_the_cost_of_its_posture_in_the_null_space():
     np.testing.assert_allclose(u, -reach / 2 * null.T @ gradient, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_controller_whose_solver_always_fails_still_passes_the_obstacle():
     """The path is followed by the dynamics; the posture by the law, better than held inputs."""
     scenario = arm_scenario("arm-001")

@@ -28,6 +28,7 @@ def stands(rollout: Rollout) -> None:
     assert settled < rollout.t[-1] - 1.0
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("horizon", HORIZONS[1:])
 def test_it_swings_up_and_stays(horizon: float) -> None:
     rollout = loop(Setting("nominal", "fatrop", horizon)).or_raise()

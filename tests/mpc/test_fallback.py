@@ -171,6 +171,7 @@ def test_without_any_state_there_is_nothing_to_go_by():
 # -- what it does ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_suggested_regulator_brings_the_cart_home():
     rollout = always_failing(cart()).run(Plant(ocp=cart()), [0.5, 0.0], 6.0)
     assert set(rollout.sources) == {InputSource.BACKUP}
@@ -187,6 +188,7 @@ def test_the_suggested_kinematics_send_what_the_plant_receives():
         np.testing.assert_array_equal(decision.input, expected)
 
 
+@pytest.mark.slow
 def test_steps_of_a_suggested_law_replay_to_the_last_bit(tmp_path: Path):
     plain = cart()
     x, aim = plain.model.x, ca.SX.sym("aim")
@@ -212,6 +214,7 @@ def test_steps_of_a_suggested_law_replay_to_the_last_bit(tmp_path: Path):
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize(("subject", "steps"), [("cart", 400), ("arm", 200)])
 def test_no_fault_gets_through_with_the_suggested_laws(subject, steps, monkeypatch):
     usual = SUBJECTS[subject]

@@ -26,6 +26,7 @@ def test_a_schedule_is_seeded_and_leaves_calm_between_faults() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize(("subject", "steps"), [("cart", 1500), ("arm", 600), ("heating", 900)])
 def test_no_fault_gets_through(subject: str, steps: int) -> None:
     report = reduce(add, campaign(subject, steps, seed=1))
@@ -35,6 +36,7 @@ def test_no_fault_gets_through(subject: str, steps: int) -> None:
     assert report.replayed > 0.05 * steps
 
 
+@pytest.mark.slow
 def test_many_steps_are_replayed_with_one_controller(tmp_path: Path) -> None:
     mpc = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1)
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:

@@ -147,6 +147,7 @@ def disc() -> OCP:
     )
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_nearest_point_of_a_disc(wanted: list[float]) -> None:
     limits = InputLimits(disc(), PlantInput(), 0.1)
@@ -158,6 +159,7 @@ def test_the_nearest_point_of_a_disc(wanted: list[float]) -> None:
         np.testing.assert_array_equal(found, wanted)
 
 
+@pytest.mark.slow
 @given(
     u=st.floats(-10, 10),
     before=st.floats(-3, 3),
@@ -186,6 +188,7 @@ def test_only_a_path_constraint_limits_an_input() -> None:
 # -- in the sizes of the rows ---------------------------------------------------------------------
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("unit", [1e-7, 1.0, 1e7])
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 def test_plans_are_judged_in_sizes_of_the_rows(unit: float, backend) -> None:

@@ -66,6 +66,7 @@ def test_without_faults_every_decision_is_optimal_and_the_cart_arrives() -> None
     assert rollout.violation < 1e-6
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("change", "word"),
     [
@@ -124,6 +125,7 @@ def test_a_plan_that_leads_astray_is_no_start_for_ever() -> None:
     assert rollout.sources[7] is InputSource.OPTIMAL
 
 
+@pytest.mark.slow
 def test_a_start_afresh_is_replayed(tmp_path: Path) -> None:
     """From its own guess the solver takes other iterations, and ends at other last digits."""
     bad = {round(DT * k, 2): becomes(Status.ITERATION_LIMIT) for k in (2, 3, 4)}
@@ -144,6 +146,7 @@ def test_what_is_not_measured_is_no_failure_of_the_plan() -> None:
     assert [guess is None for guess in watched.seen] == [True, False]
 
 
+@pytest.mark.slow
 def test_a_solver_without_a_limit_gets_one_wherever_it_is() -> None:
     def used(solver: Solver) -> Any:
         mpc = MPC(ocp=cart(), solver=solver, dt=DT, compiled=False)
@@ -192,6 +195,7 @@ def test_who_changes_an_input_changes_no_plan() -> None:
     np.testing.assert_array_equal(decision.plan.u[0], first)
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
     good = loop(controller({0.3: becomes(Status.ITERATION_LIMIT)}))
     assert good.sources[3] is InputSource.FEASIBLE
@@ -207,6 +211,7 @@ def test_an_answer_that_is_not_optimal_is_tried_on_the_model_first() -> None:
     assert "'speed' is violated" in bad.messages[3]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 @pytest.mark.parametrize("as_bound", [True, False], ids=["bound", "constraint"])
 def test_noise_at_an_active_state_constraint_passes(as_bound: bool, backend) -> None:
@@ -328,6 +333,7 @@ faults = st.sampled_from(
 jumps = st.sampled_from([[0.0, 0.0], [np.nan, 0.0], [5.0, 0.0], [0.0, -3.0], [np.inf, np.nan]])
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     script=st.dictionaries(st.integers(0, 14), faults, max_size=10),

@@ -128,6 +128,7 @@ def replace_correction(arm, path, start):
 # -- plants --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_noise_is_seeded() -> None:
     plant = Plant(ocp=cart(), measurement_noise=[0.01, 0.02], process_noise=0.05, jitter=0.2)
     one, same, other = (driver().run(plant, START, 1.0, seed=seed) for seed in (1, 1, 2))
@@ -166,6 +167,7 @@ def test_the_cost_is_that_of_the_plants_own_trajectory() -> None:
 # -- delay -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_compensation_takes_the_loss_of_a_delay_away() -> None:
     plant = Plant(ocp=cart())
     prompt = driver().run(plant, START, 3.0).cost
@@ -283,6 +285,7 @@ def test_a_rollout_is_drawn(tmp_path: Path) -> None:
     figure.savefig(tmp_path / "loop.png")
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("delay", [0.0, DT])
 def test_every_recorded_step_replays_to_the_last_bit(tmp_path: Path, delay: float) -> None:
     script = {round(t + delay, 2): lambda s: s.with_(u=s.u + 9.0) for t in (0.2, 0.3)}
@@ -326,6 +329,7 @@ def mpc_step(mpc: MPC, recorder: FlightRecorder, x: np.ndarray, t: float, late: 
         recorder.watch(x, refusal)
 
 
+@pytest.mark.slow
 def test_a_loop_records_the_refusal_that_ends_it(tmp_path: Path) -> None:
     fails = {0.3: lambda s: s.with_(status=Status.FAILED, message="as the script says")}
     mpc = MPC(ocp=cart(), solver=scripted(fails), dt=DT, backup=lambda x, t: [np.nan])

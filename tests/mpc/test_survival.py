@@ -472,6 +472,7 @@ def test_a_loop_on_good_plans_needs_no_advice() -> None:
     assert "\n" not in repr(rollout)
 
 
+@pytest.mark.slow
 def test_the_rung_is_recorded_replayed_and_saved(tmp_path) -> None:
     mpc = controller(ocp=fast())
     with FlightRecorder(mpc, tmp_path / "flight") as recorder:

@@ -47,6 +47,7 @@ SAME_OPTIMUM = 1e-8
 SAME_COSTATE = 1e-5
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("make", [swing, free_time, designed, held_still])
 def test_it_finds_the_optimum_of_ipopt(make) -> None:
     ocp = make()
@@ -247,6 +248,7 @@ def test_a_library_that_cannot_be_loaded_is_a_named_error(
         NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
 
 
+@pytest.mark.slow
 def test_a_control_loop_acts_as_with_ipopt() -> None:
     ocp = cart_pole_upright()
     start = np.array([0.0, np.pi - 0.3, 0.0, 0.0])

@@ -82,6 +82,7 @@ METHODS = (
 )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("solver", METHODS, ids=lambda s: type(s).__name__)
 def test_every_method_finds_what_it_finds_with_the_variable_written_out(solver) -> None:
     found, plain = solve(tank(), solver), solve(by_hand(), solver)
@@ -235,6 +236,7 @@ def test_in_discrete_time() -> None:
     assert abs(costs[0] - costs[1]) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_polished_answer_is_a_minimum() -> None:
     polished = polish(solve(tank(), Collocation(12)))
     assert polished.status is Status.SOLVED
@@ -249,10 +251,12 @@ def test_it_is_certified() -> None:
     assert "as written" in str(certificate)
 
 
+@pytest.mark.slow
 def test_a_sound_problem_is_diagnosed_as_one() -> None:
     assert not diagnose(tank()).findings
 
 
+@pytest.mark.slow
 def test_it_is_described_saved_and_copied(tmp_path) -> None:
     ocp = tank()
     assert "0 = (log(z)-x)" in ocp.describe()
@@ -265,6 +269,7 @@ def test_it_is_described_saved_and_copied(tmp_path) -> None:
     assert "algebraic variables" in [ax.get_ylabel() for ax in found.plot().axes]
 
 
+@pytest.mark.slow
 def test_a_loop_runs_in_machine_code() -> None:
     ocp = tank()
     with warnings.catch_warnings():

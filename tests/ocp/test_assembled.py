@@ -47,6 +47,7 @@ def numbers(function: ca.Function, ocp: OCP) -> list[ca.DM]:
     return values
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("integrator", [Euler(), Midpoint(2), RK4(), RK4(3)], ids=repr)
 @pytest.mark.parametrize("make", PROBLEMS)
 def test_what_casadi_asks_for_is_that_of_the_stage(make, integrator):

@@ -31,6 +31,7 @@ def arm() -> OCP:
     return arm_scenario("arm-001").ocp()
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("integrator", [Euler(), Midpoint(2), RK4(), RK4(3)], ids=repr)
 @pytest.mark.parametrize("make", [tracker, van_der_pol, quartic, arm, unstable_mass])
 def test_every_output_is_that_of_the_stage(make, integrator):

@@ -89,6 +89,7 @@ def prey() -> OCP:
     )
 
 
+@pytest.mark.slow
 def test_the_covariance_is_that_of_finite_differences():
     ocp = prey()
     found = solve(ocp, Collocation(24)).or_raise()

@@ -88,6 +88,7 @@ def by_hand(grid: Grid, lengths: tuple[int, ...]) -> tuple[float, np.ndarray]:
     return float(found.value(cost)), np.array(found.value(u)).ravel()[moves]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
 @pytest.mark.parametrize("blocks", [(), BLOCKS, (1, 1, 2), (3,)])
 def test_grid_and_blocks_give_the_optimum_of_a_program_by_hand(backend, blocks):
@@ -102,6 +103,7 @@ def test_grid_and_blocks_give_the_optimum_of_a_program_by_hand(backend, blocks):
     assert evaluate(found).cost == pytest.approx(found.cost, rel=1e-4)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "make",
     [
@@ -207,6 +209,7 @@ def test_a_discrete_model_has_a_grid_of_its_own():
 # -- around it ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_loop_plans_on_a_grid_that_grows():
     ocp = vdp(control_bounds=Box(-1, 1), horizon=4.0)
     grid = Grid.of_times([0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.8, 2.6, 4.0])

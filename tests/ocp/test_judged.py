@@ -30,6 +30,7 @@ def problem(f: ca.SX, running_cost: ca.SX, **changes) -> OCP:
 WAVE = problem(U + 3 * ca.sin(4800 * ca.pi * T) ** 2, U**2, terminal_cost=100 * (X - 1) ** 2)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [
@@ -64,6 +65,7 @@ def test_knots_of_a_signal_between_the_nodes_are_named_as_the_cause() -> None:
         assert solve(ocp, MultipleShooting(intervals)).status is Status.SOLVED
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
 def test_the_comparison_knows_no_units(unit: float) -> None:
     """A cost in other units, and an optimum whose cost is zero."""

@@ -60,6 +60,7 @@ def closed_form() -> tuple[np.ndarray, float]:
     return found.x, 2 * found.cost
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("solver", "accuracy"),
     [
@@ -140,6 +141,7 @@ def by_hand(x0, intervals: int = 200) -> float:
     return float(opti.solve().value(cost))
 
 
+@pytest.mark.slow
 def test_the_optimum_is_that_of_a_program_with_squares_at_its_nodes():
     """The integral of the change of a square is that change to the fourth order of the grid."""
     found = solve(cart(), MultipleShooting(200)).or_raise()
@@ -202,6 +204,7 @@ def test_perfect_data_leave_nothing_and_that_is_no_fault():
     assert found.unknowns["rate"][0] == pytest.approx(0.8, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_parameter_and_a_constant_of_the_sensor_are_in_what_is_measured():
     offset = ca.SX.sym("offset")
     data = Measurement("amount", P * X + offset, TIMES, 3 * (2 * np.exp(-0.8 * TIMES)) + 0.4)
@@ -306,6 +309,7 @@ def test_a_loop_has_no_data():
         MPC(ocp=cart(), solver=MultipleShooting(20), dt=0.1)
 
 
+@pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=8, unique=True))
 def test_data_at_any_instants_are_an_integral(times):

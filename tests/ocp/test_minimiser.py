@@ -83,6 +83,7 @@ def test_the_law_is_differentiated_through_its_root() -> None:
     assert slope == pytest.approx(differences, abs=DERIVATIVE)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("costate", [np.zeros(2), np.array([1e-9, 0.0]), np.array([1e12, -1e12])])
 def test_where_there_is_no_minimum_the_referee_says_so(costate: np.ndarray) -> None:
     """Without costates H is flat and its Jacobian singular: a bad verdict, no exception."""

@@ -34,6 +34,7 @@ def signal(samples, hold: Literal["held", "linear"] = "held") -> Signal:
     return Signal("r", R, samples, hold=hold)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("hold", ["held", "linear"])
 @pytest.mark.parametrize(
     "solver",
@@ -65,6 +66,7 @@ def test_an_extremal_takes_the_knots_in():
     assert shot.cost == pytest.approx(direct.cost, rel=1e-2)
 
 
+@pytest.mark.slow
 @given(
     intervals=st.integers(1, 400),
     samples=st.integers(2, 60),

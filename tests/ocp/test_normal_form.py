@@ -151,6 +151,7 @@ def test_they_are_certified(ocp):
     assert certificate.cost == pytest.approx(values[ocp.name], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_what_takes_a_solution_takes_these():
     ocp = geared()
     rough = solve(ocp, MultipleShooting(10))
@@ -210,6 +211,7 @@ def test_a_problem_is_forgotten_with_all_that_was_made_of_it(make):
     assert left() is None
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(unit=st.integers(-6, 6))
 def test_units_do_not_matter(unit):

@@ -118,6 +118,7 @@ CASES = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", CASES)
 def test_control_minimises_the_hamiltonian(name: str) -> None:
     cost, box, form = CASES[name]

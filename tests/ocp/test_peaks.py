@@ -134,6 +134,7 @@ def test_units_change_nothing(unit):
     assert found.peaks["effort"] * unit == pytest.approx(4.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_files_words_and_the_other_tools(tmp_path):
     ocp = mass()
     found = solve(ocp, MultipleShooting(10)).or_raise()
@@ -150,6 +151,7 @@ def test_files_words_and_the_other_tools(tmp_path):
         IndirectShooting(5).build(ocp)
 
 
+@pytest.mark.slow
 def test_a_loop_keeps_the_peak_of_its_horizon_low():
     ocp = mass(
         constraints=(),

@@ -99,6 +99,7 @@ def test_the_referee_integrates_a_parabola_exactly() -> None:
     assert verdict.truth.x[-1, 0] == pytest.approx(2.0 / 3.0, abs=ROUNDING)
 
 
+@pytest.mark.slow
 def test_costates_and_stationarity_are_derivatives_of_the_cost() -> None:
     """abs(u - (u - dJ/dc / weight)) with dJ/dc by differences; costates by moving the start."""
     ocp = pendulum()

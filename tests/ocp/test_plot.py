@@ -104,6 +104,7 @@ def test_linear_controls_and_signals() -> None:
     np.testing.assert_allclose(rows, [0.5, -0.5, 1.0, 0.3])
 
 
+@pytest.mark.slow
 def test_drawing_leaves_pyplot_alone() -> None:
     code = (
         "import sys, numpy as np; from tests.ocp.problems import energy, trajectory;"

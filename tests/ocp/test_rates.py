@@ -226,6 +226,7 @@ def test_the_sensitivity_is_the_slope_of_the_cost(ocp):
     assert program.run().sensitivity["last_input"][0] == pytest.approx(slope, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_beside_every_other_term_of_the_normal_form():
     k = ca.SX.sym("k")
     ocp = mass(
@@ -356,6 +357,7 @@ def test_it_is_kept_in_files_copies_and_words(tmp_path):
     assert found.plot().axes
 
 
+@pytest.mark.slow
 def test_the_other_tools_speak_of_the_rate():
     tight = mass(rates=(Rate(F, -1, 1),))
     assert "rate of force" in str(diagnose(tight))

@@ -124,6 +124,7 @@ def error_and_bar(kind: Kind, seed: int) -> tuple[float, float]:
     return abs(verdict.cost - cost) / abs(cost), verdict.cost_error / abs(cost)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_cost_is_within_its_own_error_bar(kind: Kind, seed: int) -> None:
@@ -153,6 +154,7 @@ def test_a_wave_that_two_grids_take_for_a_constant() -> None:
     assert moved.cost == pytest.approx(0.75, rel=1e-6)  # x = 3 t / 2 but for a ripple of 1e-4
 
 
+@pytest.mark.slow
 def test_no_error_is_claimed_that_was_not_measured() -> None:
     """Thousands of nodes: the steps are shortened twice at least."""
     solution, cost = many_nodes(np.random.default_rng(3))

@@ -77,6 +77,7 @@ def test_states_may_be_entries_of_a_symbol() -> None:
     assert model.u_names == ("z_2",)
 
 
+@pytest.mark.slow
 def test_what_has_no_scalar_form_is_called() -> None:
     """Solving M(q) q'' = u, a root finder and a table, in MX: as what is written out in SX."""
     x, u = MX.sym("x", 2), MX.sym("u")

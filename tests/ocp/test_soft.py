@@ -64,6 +64,7 @@ class TestDirect:
         assert found.cost == pytest.approx(hard.cost, rel=1e-6)
         assert found.slack["slow"].max() < 1e-6
 
+    @pytest.mark.many
     @pytest.mark.parametrize("soft", [Soft(10), Soft(5, 20), Soft(quadratic=100)])
     def test_below_it_gives_way_and_costs_what_the_referee_says(self, solver, soft):
         found = solve(transfer(soft), solver).or_raise()
@@ -74,6 +75,7 @@ class TestDirect:
         assert verdict.cost < HARD
         assert verdict.violation == pytest.approx(0.0, abs=1e-7)
 
+    @pytest.mark.many
     @pytest.mark.parametrize(
         # Below the multiplier of the hard end, 12, the position pulls by w = 3: it gets w/12 far.
         ("soft", "cost", "left"),
@@ -91,6 +93,7 @@ class TestDirect:
         assert found.slack["arrival"][0] == pytest.approx(left, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_two_transcriptions_agree_with_the_shape_of_the_optimum():
     direct = solve(transfer(Soft(10)), MultipleShooting(400)).or_raise()
     assert evaluate(direct).cost == pytest.approx(
@@ -149,6 +152,7 @@ def regulator(soft: Soft, *, dt: float | None = None) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("ocp", "solver"),
     [

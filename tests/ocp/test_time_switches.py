@@ -31,6 +31,7 @@ PULSES = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("pulse", PULSES.values(), ids=list(PULSES))
 @pytest.mark.parametrize(
     "solver",
@@ -53,6 +54,7 @@ def test_a_pulse_between_the_nodes_is_no_secret(solver, pulse) -> None:
         assert found.cost == pytest.approx(verdict.cost, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_what_a_pulse_costs_is_known_to_the_referee() -> None:
     """Without control x = 0.5 from the pulse on, but for 1/3 of it while it lasts."""
     found = solve(
@@ -70,6 +72,7 @@ def test_a_run_that_begins_later_is_judged_by_its_own_clock() -> None:
     assert not found.status.is_success
 
 
+@pytest.mark.slow
 @given(
     at=st.floats(0.01, 0.99),
     width=st.floats(1e-6, 1e-3),

@@ -64,6 +64,7 @@ def test_costates_are_slopes_of_the_optimal_cost(name: str) -> None:
         )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", ["double-integrator-energy", "arm-001-sum", "arm-003-sum"])
 def test_costates_of_the_reference(name: str) -> None:
     case = CASES[name]
@@ -95,6 +96,7 @@ def test_certified_optima(name: str, intervals: int) -> None:
     assert abs(gap) <= CERTIFIED
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [

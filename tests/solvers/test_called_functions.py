@@ -135,6 +135,7 @@ def every(solvers: list[Any]) -> list[Any]:
     ]
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("name", "solver"), every(DIRECT))
 def test_a_direct_method_solves_it_as_the_formula(name: str, solver: Solver) -> None:
     called, written = PROBLEMS[name]
@@ -145,6 +146,7 @@ def test_a_direct_method_solves_it_as_the_formula(name: str, solver: Solver) -> 
     assert evaluate(found).cost == pytest.approx(evaluate(expected).cost, rel=1e-6)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("name", "solver"), every(UNCONSTRAINED))
 def test_a_method_without_constraints_as_well(name: str, solver: Solver) -> None:
     called, written = (with_free_end(each) for each in PROBLEMS[name])
@@ -165,6 +167,7 @@ def test_direct_and_indirect_agree_on_cost_and_costates(name: str) -> None:
     assert (evaluate(exact).stationarity or 0.0) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_table_is_certified() -> None:
     certificate = certify(solve(PROBLEMS["table"][0], MultipleShooting(30)))
     assert certificate.holds, str(certificate)
@@ -338,6 +341,7 @@ def test_a_called_cost_of_the_control_has_a_minimiser() -> None:
     assert float(control([0.3, 0.1], [1.0, -2.0], 0.0, [])) == pytest.approx(2.0)  # type: ignore
 
 
+@pytest.mark.slow
 def test_the_control_may_stand_in_a_function_of_a_library(external: ca.Function) -> None:
     ocp = pushed(-0.1 * external(FORCE))
     found = solve(ocp, IndirectShooting(5, steps=60))

@@ -69,6 +69,7 @@ SOLVERS = [
 ]
 
 
+@pytest.mark.many
 @needs_compiler
 @pytest.mark.parametrize(
     "solver", SOLVERS, ids=["ipopt", "fatrop", "newton", "indirect", "thesis", "sound"]
@@ -87,6 +88,7 @@ def parts(solution: Solution) -> tuple[np.ndarray, ...]:
     return solution.t, solution.x, solution.u, solution.costate
 
 
+@pytest.mark.many
 @needs_compiler
 @pytest.mark.parametrize("ocp", PROBLEMS, ids=lambda ocp: ocp.name)
 @pytest.mark.parametrize("backend", ["ipopt", "fatrop"])

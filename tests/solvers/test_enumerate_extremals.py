@@ -13,6 +13,7 @@ from tests.solvers.test_reverse_shooting import SAME_COST, bare
 from tests.tolerances import GAP, RESIDUAL
 
 
+@pytest.mark.slow
 def test_without_obstacle_there_is_one_extremal() -> None:
     ocp = bare()
     found = enumerate_extremals(ocp)
@@ -49,11 +50,13 @@ def test_the_scan_is_the_same_every_time_and_fine_where_it_says_so() -> None:
     assert one.scans[0].distances.max() <= 0.3
 
 
+@pytest.mark.slow
 def test_few_points_are_admitted() -> None:
     found = enumerate_extremals(arm_scenario("arm-001").ocp("sum"), points=100, keep=1)
     assert found.unresolved > 0
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm-001-sum", "arm-009-sum", "arm-015-sum", "arm-030-sum"])
 def test_the_reference_is_found(name: str) -> None:
@@ -106,6 +109,7 @@ def test_refuses_what_it_cannot_enumerate() -> None:
         enumerate_extremals(ocp, keep=0)
 
 
+@pytest.mark.slow
 def test_roots_that_newton_does_not_confirm_are_counted() -> None:
     hasty = IndirectShooting(segments=15, tolerance=1e-300)
     found = enumerate_extremals(bare(), solver=hasty)
@@ -113,6 +117,7 @@ def test_roots_that_newton_does_not_confirm_are_counted() -> None:
     assert found.costs.shape == (0,)
 
 
+@pytest.mark.slow
 def test_steps_are_halved_until_the_cost_holds_still():
     # From few steps the same extremals as from many.
     ocp = bare()

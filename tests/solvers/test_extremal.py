@@ -30,6 +30,7 @@ PROBLEMS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("segments", [1, 4])
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_jacobian(name: str, segments: int) -> None:

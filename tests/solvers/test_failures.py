@@ -150,6 +150,7 @@ INFEASIBLE: dict[str, tuple[Callable[[], OCP], str, float]] = {
 }
 
 
+@pytest.mark.many
 @direct
 @pytest.mark.parametrize("name", INFEASIBLE)
 def test_infeasible_names_constraint_and_time(name: str, solver: Solver) -> None:
@@ -248,6 +249,7 @@ def test_iteration_limit_of_shooting() -> None:
     assert re.fullmatch(r"residual \S+ after 2 Newton steps", solution.message)
 
 
+@pytest.mark.many
 @direct
 @pytest.mark.parametrize(
     "terms",
@@ -282,6 +284,7 @@ UNDEFINED = {
 }
 
 
+@pytest.mark.many
 @every
 @pytest.mark.parametrize("name", UNDEFINED)
 def test_nan_away_from_the_start(name: str, solver: Solver) -> None:
@@ -298,6 +301,7 @@ def test_nan_away_from_the_start(name: str, solver: Solver) -> None:
         assert name == "blow-up"
 
 
+@pytest.mark.many
 @every
 def test_a_bad_guess_is_survived(solver: Solver) -> None:
     guess = Guess(x=[1e3, -1e3], u=[1e4], costate=[1e6, -1e6])
@@ -307,12 +311,14 @@ def test_a_bad_guess_is_survived(solver: Solver) -> None:
         assert evaluate(solution).cost < 1.1
 
 
+@pytest.mark.many
 @every
 def test_success_is_silent_too(solver: Solver) -> None:
     solution = solve(changed(van_der_pol(), horizon=1.0), solver)
     assert np.isfinite(solution.x).all()
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [*(MultipleShooting(40, backend=b) for b in ("ipopt", "fatrop", "native")), Collocation(20)],

@@ -40,6 +40,7 @@ def upright(horizon: float) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("horizon", [6.0, 20.0])
 @pytest.mark.parametrize("method", [MultipleShooting, StagewiseNewton, Collocation])
 def test_an_unstable_system_is_solved_as_from_rest(
@@ -89,6 +90,7 @@ def quickest(guess: float, start: list[float], end: list[float]) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("solver", [MultipleShooting(60), Collocation(20)], ids=repr)
 @pytest.mark.parametrize("guess", [0.5, 2.0, 8.0])
 def test_a_short_guess_of_the_final_time_is_lengthened(guess: float, solver: Solver) -> None:

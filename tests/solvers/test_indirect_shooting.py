@@ -88,6 +88,7 @@ def test_saturated_control(segments: int) -> None:
     assert solve(ocp, MultipleShooting(200)).cost == pytest.approx(cost, rel=DIRECT_COST)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("bounds", [Box(), Box(-0.4, 0.4)], ids=["free", "bounded"])
 def test_implicit_control(bounds: Box) -> None:
     ocp = quartic(control_bounds=bounds)
@@ -138,6 +139,7 @@ def test_manifold_start(name: str) -> None:
         assert np.abs(along).max() <= accuracy * np.abs(answer.costate[0]).max()
 
 
+@pytest.mark.slow
 def test_from_the_costates_of_the_thesis() -> None:
     """psi(t0) = (0, 10, -10) in our sign: plain Newton finds the optimum, the damped one stalls."""
     guess = Guess(costate=[0.0, 10.0, -10.0])

@@ -70,6 +70,7 @@ KINKS = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("pull", JUMPS.values(), ids=list(JUMPS))
 @pytest.mark.parametrize("solver", [MultipleShooting(30), Collocation(10)], ids=repr)
 def test_a_jump_on_the_way_is_found(solver, pull):
@@ -146,6 +147,7 @@ def test_what_is_convex_is_replaced_and_the_rest_stays():
     assert without_kinks(fuel(ca.fabs(U))).smoothness == 2
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "solver",
     [
@@ -230,6 +232,7 @@ def test_a_weight_that_grows_with_time_is_replaced(solver) -> None:
     assert found.cost == pytest.approx(evaluate(found).cost, rel=1e-4)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("hold", ["held", "linear"])
 def test_a_price_that_is_negative_for_a_sample_keeps_its_kink(hold) -> None:
     price, samples = ca.SX.sym("price"), np.ones((42, 1))
@@ -258,6 +261,7 @@ def test_names_and_sizes_of_the_user_are_no_obstacle() -> None:
     assert solve(sized, MultipleShooting(50)).cost == pytest.approx(FUEL, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_what_a_held_slack_cannot_follow_stays_as_it_is():
     """A slack that is held misses the integral of abs(x), so only Collocation replaces it."""
     asked = ride(0.0, ca.fabs(X - FAR) + 1e-2 * U**2)
@@ -290,6 +294,7 @@ def test_nothing_to_replace():
         without_kinks(fuel(U**2))
 
 
+@pytest.mark.slow
 def test_the_advice_on_a_kink_leads_on():
     for smoothness in (0, 2):
         kinked = fuel(ca.fabs(U), smoothness=smoothness)
@@ -313,6 +318,7 @@ def test_indirect_methods_refuse_a_kink_in_the_control():
 # -- no error where there is an answer ----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_force_that_keeps_a_length_is_no_free_control():
     x, y, a, b, rod, f = (ca.SX.sym(name) for name in ("x", "y", "a", "b", "rod", "f"))
     bob = Model(
@@ -335,6 +341,7 @@ def test_a_force_that_keeps_a_length_is_no_free_control():
     assert not diagnose(swing).serious
 
 
+@pytest.mark.slow
 def test_a_constraint_whose_slope_vanishes_at_zero_is_no_contradiction():
     c, s = ca.SX.sym("c"), ca.SX.sym("s")
     ship = Model(name="ship", x=ca.vertcat(X, V), u=ca.vertcat(c, s), f=ca.vertcat(c, s))

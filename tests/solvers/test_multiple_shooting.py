@@ -85,6 +85,7 @@ PROBLEMS: dict[str, Callable[[], OCP]] = {
 }
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_backends_agree(name: str) -> None:
     ocp = PROBLEMS[name]()
@@ -214,6 +215,7 @@ def test_all_constraints_are_met_and_active(backend: Backend) -> None:
     assert evaluate(solution).violation <= (u**2).max() * 2.0 / 50
 
 
+@pytest.mark.many
 @both
 @pytest.mark.parametrize("limit", [1.0, 30.0])
 def test_controls_never_leave_their_bounds(backend: Backend, limit: float) -> None:
@@ -236,6 +238,7 @@ def test_coarse_integrators_of_any_order() -> None:
 # -- starts ---------------------------------------------------------------------------
 
 
+@pytest.mark.many
 @both
 def test_any_solution_starts_it(backend: Backend) -> None:
     ocp = van_der_pol()
@@ -265,6 +268,7 @@ def test_a_maximum_is_left(backend: Backend) -> None:
     assert evaluate(solution).cost == pytest.approx(-1.0, rel=CERTIFIED)
 
 
+@pytest.mark.many
 @both
 def test_deterministic(backend: Backend) -> None:
     ocp = arm_scenario("arm-002").ocp()
@@ -275,6 +279,7 @@ def test_deterministic(backend: Backend) -> None:
     assert (one.cost, one.iterations, one.work) == (other.cost, other.iterations, other.work)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 12), st.sampled_from([van_der_pol, double_integrator_energy, tracker]))
 @settings(max_examples=12, deadline=None)
 def test_any_number_of_intervals(intervals: int, make: Callable[[], OCP]) -> None:

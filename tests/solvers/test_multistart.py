@@ -14,6 +14,7 @@ from tests.tolerances import CERTIFIED
 STARTS = 6
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("name", "basins"), [("arm-001", (5.079, 20.722)), ("arm-003", (2.369, 2.920))]
 )

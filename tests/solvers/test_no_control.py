@@ -81,6 +81,7 @@ def coasting() -> OCP:
     return OCP(name="coasting", model=body, x0=[1.0], horizon=4, running_cost=x**2)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("solver", SOLVERS, ids=repr)
 @pytest.mark.parametrize(
     ("ocp", "cost"),
@@ -107,6 +108,7 @@ def test_solved_or_refused_by_name(ocp, cost, solver, tmp_path):
     assert found.plot().axes
 
 
+@pytest.mark.slow
 def test_what_builds_on_solvers():
     found = solve(flight(), MultipleShooting(40))
     assert polish(found).cost == pytest.approx(LEAST, rel=1e-9)

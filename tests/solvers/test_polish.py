@@ -37,6 +37,7 @@ def held(case: Case) -> Solution:
     return solve(case.build(), MultipleShooting(75))
 
 
+@pytest.mark.slow
 def test_starts_again_from_a_finer_grid_where_newton_fails() -> None:
     direct = held(case_called("arm-024-sum"))
     plain = solve(direct.problem, IndirectShooting(segments=15), guess=direct)
@@ -78,6 +79,7 @@ def test_an_extremal_that_finer_steps_lose_is_inaccurate() -> None:
     assert extremal.residual < RESIDUAL
 
 
+@pytest.mark.slow
 def test_reaches_an_accuracy_from_an_inaccurate_start() -> None:
     case = case_called("hypersensitive")
     direct = held(case)
@@ -119,6 +121,7 @@ def test_the_change_under_half_the_step_is_predicted(name: str) -> None:
     assert 0.0 < predicted.state < 1e-5
 
 
+@pytest.mark.slow
 def test_curvature_is_tested_once(monkeypatch: pytest.MonkeyPatch) -> None:
     tested, test = [], IndirectShootingProgram.second_order
 

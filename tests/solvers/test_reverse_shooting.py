@@ -52,6 +52,7 @@ def agree(one: Solution, other: Solution) -> None:
         assert np.abs(one.x[row] - other.x[row]).max() <= SAME_CONFIGURATION
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("boundary", [2, 3, 4])
 def test_agrees_with_direct_multiple_shooting(boundary: Boundary) -> None:
     ocp = bare(free_start=boundary != 4)
@@ -64,6 +65,7 @@ def test_agrees_with_direct_multiple_shooting(boundary: Boundary) -> None:
     assert polish(reverse).status is Status.SOLVED
 
 
+@pytest.mark.slow
 def test_types_2_and_3_are_the_same_and_meet_transversality() -> None:
     ocp = bare(free_start=True)
     second, third = (solve(ocp, ReverseShooting(boundary=b)).or_raise() for b in (2, 3))
@@ -74,6 +76,7 @@ def test_types_2_and_3_are_the_same_and_meet_transversality() -> None:
     np.testing.assert_array_equal(third.costate[-1], 0.0)
 
 
+@pytest.mark.slow
 def test_two_redundant_degrees_of_freedom_need_no_trace() -> None:
     given = {"lengths": (0.8,) * 4, "theta0": (1.2, -0.9, -0.8, -0.6)}
     ocp = bare(free_start=True, **given)
@@ -83,6 +86,7 @@ def test_two_redundant_degrees_of_freedom_need_no_trace() -> None:
     )
 
 
+@pytest.mark.slow
 def test_with_obstacle_from_near_by() -> None:
     ocp = arm_scenario("arm-001").ocp("sum")
     extremal = polish(solve(ocp, MultipleShooting(75)))

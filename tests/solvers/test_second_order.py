@@ -31,6 +31,7 @@ def test_passes_with_a_saturated_control() -> None:
     assert judged(saturated_transfer()[0])[1].passed
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("size", "segments"), [(1, 1), (2, 1), (3, 4)])
 @pytest.mark.parametrize(
     ("fixed", "before_end", "durations"),

@@ -100,6 +100,7 @@ def at_bounds(solution: Solution) -> float:
 # -- the same minima ---------------------------------------------------------------------
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("make", "n"),
     [(bounded_tracker, 40), (bounded_quartic, 40), (bounded_mass, 20), (arm, 30), (upright, 20),

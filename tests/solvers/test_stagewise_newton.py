@@ -93,6 +93,7 @@ def test_unstable_dynamics_over_a_long_horizon() -> None:
     assert solve(ocp, StagewiseNewton(300), guess=guess).status is Status.INACCURATE
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(1, 41))
 def test_every_arm_scenario(number: int) -> None:
@@ -107,6 +108,7 @@ def test_every_arm_scenario(number: int) -> None:
     agree(program.run(guess=near), direct)
 
 
+@pytest.mark.slow
 def test_seven_links_without_their_limits() -> None:
     ocp = seven_links(gain=10.0, clearance=None, joint_bounds=None)
     # IPOPT scales this cost: at its 1e-9 it still lies 4e-10 above the minimum.

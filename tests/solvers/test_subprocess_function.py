@@ -235,6 +235,7 @@ def builds(count: int) -> None:
         assert open_now() == before
 
 
+@pytest.mark.slow
 @apart
 def test_a_dropped_program_leaves_nothing(uncollected: None) -> None:
     builds(20)
@@ -289,6 +290,7 @@ def test_fatrop_apart_returns_the_same_numbers() -> None:
     assert first.iterations == second.iterations
 
 
+@pytest.mark.slow
 @apart
 def test_fatrop_is_ended_where_it_never_returns() -> None:
     """fatrop 1.1.8, a first iterate and data recorded in a loop: no step can be computed there."""

@@ -71,7 +71,7 @@ def judge(case: Case, family: Family, solution: Solution) -> None:
 
 
 def marked(case: Case, label: str, *values: object):
-    marks = [pytest.mark.slow] if case.name in SLOW else []
+    marks = [pytest.mark.slow, pytest.mark.over_library] if case.name in SLOW else []
     return pytest.param(case, *values, id=f"{case.name}-{label}", marks=marks)
 
 
@@ -88,6 +88,7 @@ def label_of(solver: Solver) -> str:
     return f"{type(solver).__name__}{variant}"
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     ("case", "family", "solver"),
     [
@@ -108,6 +109,7 @@ def test_solver_on_case(case: Case, family: Family, solver: Solver) -> None:
     judge(case, family, solve(case.build(), solver, guess=guess))
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(
     "case", [marked(case, "polish") for case in CASES if "polish" in case.families]
 )

@@ -64,6 +64,7 @@ def same_numbers(one: Solution, other: Solution) -> None:
 # -- descriptions -----------------------------------------------------------------------------
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("case", [*LIBRARY, *arm_cases()[:2]], ids=lambda case: case.name)
 @each_way
 def test_a_copied_problem_says_the_same(way: Callable, case: Case) -> None:
@@ -175,6 +176,7 @@ def test_every_solver_is_here() -> None:
     assert {type(solver) for solver, _ in EVERY} == known
 
 
+@pytest.mark.many
 @each_way
 @each_solver
 def test_a_copied_program_finds_the_same(way: Callable, solver: Solver, ocp: OCP) -> None:
@@ -185,6 +187,7 @@ def test_a_copied_program_finds_the_same(way: Callable, solver: Solver, ocp: OCP
     same_numbers(way(program).run(), first)
 
 
+@pytest.mark.many
 @each_way
 @each_solver
 def test_a_copied_solution_is_worth_the_same(way: Callable, solver: Solver, ocp: OCP) -> None:
@@ -225,6 +228,7 @@ def test_a_law_whose_backend_has_run(way: Callable) -> None:
 # -- the loop ---------------------------------------------------------------------------------
 
 
+@pytest.mark.many
 @each_way
 @pytest.mark.parametrize("delay", [0.0, 0.1])
 def test_a_copied_controller_goes_on_where_the_original_was(way: Callable, delay: float) -> None:
@@ -241,6 +245,7 @@ def test_a_copied_controller_goes_on_where_the_original_was(way: Callable, delay
     assert other.state.plan is not mpc.state.plan, "and from there on they are two"
 
 
+@pytest.mark.many
 @each_way
 def test_a_rollout_with_its_plans(way: Callable) -> None:
     mpc = MPC(ocp=cart(), solver=MultipleShooting(10), dt=0.1, compiled=False)
@@ -277,6 +282,7 @@ def test_a_spawned_process_solves_and_answers(spawned: Executor) -> None:
     np.testing.assert_array_equal(spawned.submit(first_input, mpc).result(), first_input(mpc))
 
 
+@pytest.mark.slow
 def test_loky_takes_laws_that_are_written_in_place() -> None:
     joblib = pytest.importorskip("joblib")
     mpc = MPC(

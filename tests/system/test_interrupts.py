@@ -155,7 +155,7 @@ def ctrl_c(what: str, times: int) -> None:
             print("out")
 
 
-QUICK = {"ipopt", "loop", "osqp"}
+QUICK = {"ipopt", "loop"}
 
 
 @pytest.mark.parametrize(
@@ -174,6 +174,7 @@ def test_ctrl_c_comes_out(what: str) -> None:
     assert lines.count("lost") <= FORGOTTEN.get(what, 0), done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SUBPROCESS_SUPPORTED, reason="this system has no fork or no alarms")
 def test_ctrl_c_ends_the_process_of_fatrop() -> None:
     solver = MultipleShooting(100, backend="fatrop", time_limit=100.0)

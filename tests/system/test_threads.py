@@ -111,11 +111,13 @@ def answers_of_one_controller(count: int) -> bool:
 WHAT = ("one_program", "two_programs", "two_controllers", "one_controller")
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("what", WHAT)
 def test_threads_get_the_answers_of_one(what: str) -> None:
     assert in_a_process(SHARED.format(what=what, count=40)) == "True True"
 
 
+@pytest.mark.over_library
 @pytest.mark.slow
 @pytest.mark.parametrize("what", WHAT)
 def test_threads_get_the_answers_of_one_for_long(what: str) -> None:
@@ -123,6 +125,7 @@ def test_threads_get_the_answers_of_one_for_long(what: str) -> None:
     assert in_a_process(SHARED.format(what=what, count=count)) == "True True"
 
 
+@pytest.mark.many
 @each_solver
 def test_a_program_of_every_solver_serves_two_threads(solver: Solver, ocp: OCP) -> None:
     program = solver.build(ocp)
@@ -131,6 +134,7 @@ def test_a_program_of_every_solver_serves_two_threads(solver: Solver, ocp: OCP) 
         np.testing.assert_allclose(solution.u, want.u, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_two_threads_build_and_judge_one_problem() -> None:
     """What is derived once is derived by whoever comes first; the referee remembers for both."""
     for _ in range(5):

@@ -41,6 +41,7 @@ def with_far(ocp: OCP, how: str, far: float) -> OCP:
     return replace(ocp, **{name: Box(-far, far) for name in chosen})
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("far", [1e7, 1e9, 1e15])
 @pytest.mark.parametrize(
     "how", ["controls", "states", "both", "linear", "saturating", "one-sided", "integral"]

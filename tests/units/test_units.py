@@ -33,6 +33,7 @@ FLAT = {
 }  # fmt: skip
 CASES = [c for c in all_cases() if c.suite == "library" and c.name not in FLAT]
 QUICK = {"van-der-pol", "bryson-denham", "brachistochrone", "catalyst-mixing", "mass-tracking"}
+SLOW = [pytest.mark.slow, pytest.mark.over_library]
 SOLVERS: tuple[Solver, ...] = (MultipleShooting(40), Collocation(15))
 
 
@@ -48,10 +49,7 @@ def same_in_other_units(ocp: OCP, solver: Solver, seed: int) -> None:
 @pytest.mark.parametrize("solver", SOLVERS, ids=["shooting", "collocation"])
 @pytest.mark.parametrize(
     "case",
-    [
-        pytest.param(c, id=c.name, marks=[] if c.name in QUICK else [pytest.mark.slow])
-        for c in CASES
-    ],
+    [pytest.param(c, id=c.name, marks=[] if c.name in QUICK else SLOW) for c in CASES],
 )
 def test_direct_methods(case, solver) -> None:
     if isinstance(solver, Collocation) and case.build().model.is_discrete:
@@ -64,6 +62,7 @@ def test_newton(seed) -> None:
     same_in_other_units(van_der_pol(), StagewiseNewton(40), seed)
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("seed", range(3))
 def test_a_polished_answer(seed) -> None:
     ocp = van_der_pol()
@@ -101,6 +100,7 @@ def random_program(seed: int) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize("backend", ["osqp", "quadprog"])
 @pytest.mark.parametrize("seed", range(25))
 def test_linear_mpc(seed, backend) -> None:
@@ -136,6 +136,7 @@ def speed_limited(length: float = 1.0, cost: float = 1.0) -> OCP:
     )
 
 
+@pytest.mark.many
 @pytest.mark.parametrize(("backend", "form"), [("osqp", "sparse"), ("daqp", "condensed")])
 @pytest.mark.parametrize("length", [1e3, 1e6])
 @pytest.mark.parametrize("price", [0.1, 10.0])
@@ -307,7 +308,14 @@ def test_an_orbit_in_any_unit(metre: float, second: float) -> None:
     assert found.status.is_success, found.message
     assert found.x[-1, 0] * metre / UNIT == pytest.approx(1.52545, rel=1e-5)
     assert found.iterations < 30
-    assert Cause.UNSOLVED not in [finding.cause for finding in diagnose(asked).findings]
+
+
+@pytest.mark.slow
+@pytest.mark.over_library
+@pytest.mark.parametrize(("metre", "second"), UNITS)
+def test_an_orbit_in_any_unit_is_diagnosed_as_solved(metre: float, second: float) -> None:
+    findings = diagnose(transfer(metre, second)).findings
+    assert Cause.UNSOLVED not in [finding.cause for finding in findings]
 
 
 @pytest.mark.parametrize(("metre", "second"), UNITS)

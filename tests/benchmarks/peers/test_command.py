@@ -39,6 +39,7 @@ def test_list_names_peers_and_problems(capsys, empty_cache):
         assert problem in shown
 
 
+@pytest.mark.slow
 def test_a_peer_that_is_not_installed_is_said_with_what_to_type(capsys, empty_cache, tmp_path):
     out = tmp_path / "peers.json"
     words = ["peers", "run", "--peer", "qpmpc", "--problem", "linear", "--cold", "1"]
