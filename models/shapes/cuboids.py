@@ -7,11 +7,14 @@ import casadi as ca
 from models.shapes.gap import PARALLEL, TINY, Gap, clamped, piecewise_constant
 
 _AXES = range(3)
+# More than any slope [m^2].
+_FAR = 1e30
 
 
 def point_to_box(x: ca.SX, half: ca.DM) -> Gap:
     """Return the gap from a box to a point (3,) in the box's frame [m]; negative inside."""
-    corner, line, face, has_plane = _point_choice()(x, half)
+    found = _point_choice()(ca.vertcat(x, half))
+    corner, line, face, has_plane = ca.vertsplit(found, [0, 3, 6, 9, 10])
     return Gap(x - corner, line, face, has_plane)
 
 
@@ -25,7 +28,9 @@ def segment_to_box(start: ca.SX, end: ca.SX, half: ca.DM, *, signed: bool) -> Ga
         signed: whether the depth of a segment that enters the box counts; else it is 0.
     """
     along = end - start
-    part, corner, free, edge, across, face, has_plane = _segment_choice(signed)(start, along, half)
+    found = _segment_choice(signed)(ca.vertcat(start, along, half))
+    columns = ca.vertsplit(found, [0, 1, 4, 5, 8, 11, 14, 15])
+    part, corner, free, edge, across, face, has_plane = columns
     line = free * along + edge
     return Gap(start + part * along - corner, line, face + ca.cross(along, across), has_plane)
 
@@ -44,9 +49,8 @@ def _point_choice() -> ca.Function:
     side = ca.if_else(inside, first * ca.if_else(x < 0.0, -1.0, 1.0), side)
     is_face = ca.logic_or(inside, count == 1.0)
     line = (count == 2.0) * (1.0 - side**2)
-    names = ["x", "half"], ["corner", "line", "face", "has_plane"]
-    outputs = [side * half, line, is_face * side, is_face]
-    return piecewise_constant("nearest_on_box", [x, half], outputs, names)
+    choice = ca.vertcat(side * half, line, is_face * side, is_face)
+    return piecewise_constant("nearest_on_box", ca.vertcat(x, half), choice)
 
 
 @cache
@@ -76,10 +80,8 @@ def _segment_choice(signed: bool) -> ca.Function:
     )
     if signed:
         choice = ca.if_else(count == 0.0, _deepest(p, u, half), choice)
-    outputs = ca.vertsplit(choice, [0, 1, 4, 5, 8, 11, 14, 15])
-    found = ["part", "corner", "free", "edge", "across", "face", "has_plane"]
-    name = "nearest_of_segment_and_box" if not signed else "nearest_or_deepest_of_segment_and_box"
-    return piecewise_constant(name, [p, u, half], outputs, (["p", "u", "half"], found))
+    name = "nearest_or_deepest_in_box" if signed else "nearest_to_box"
+    return piecewise_constant(name, ca.vertcat(p, u, half), choice)
 
 
 def _side(x: ca.SX, half: ca.SX) -> ca.SX:
@@ -97,17 +99,16 @@ def _nearest_part(p: ca.SX, u: ca.SX, half: ca.SX) -> ca.SX:
     crossings = [(s * half[i] - p[i]) / (u[i] + TINY) for i in _AXES for s in (-1.0, 1.0)]
     places = [ca.SX(0), ca.SX(1), *map(clamped, crossings)]
     slopes = [_slope(p + at * u, u, half) for at in places]
-    low, high, below, above = ca.SX(0), ca.SX(1), -ca.inf, ca.inf
+    low, high, below, above = ca.SX(0), ca.SX(1), -_FAR, _FAR
     for at, slope in zip(places, slopes, strict=True):
         positive = slope > 0.0
-        low = ca.fmax(low, ca.if_else(positive, 0.0, at))
-        high = ca.fmin(high, ca.if_else(positive, at, 1.0))
-        below = ca.fmax(below, ca.if_else(positive, -ca.inf, slope))
-        above = ca.fmin(above, ca.if_else(positive, slope, ca.inf))
-    # Without an end the zero lies beyond the segment: then low is high.
-    between = ca.logic_and(below > -ca.inf, above < ca.inf)
-    share = ca.if_else(between, -below / (above - below), 0.0)
-    return ca.if_else(slopes[0] > 0.0, 0.0, low + share * (high - low))
+        other = 1.0 - positive
+        # What does not count for an end is moved beyond it.
+        low, high = ca.fmax(low, at - positive), ca.fmin(high, at + other)
+        below = ca.fmax(below, slope - _FAR * positive)
+        above = ca.fmin(above, slope + _FAR * other)
+    # Where the zero lies beyond the segment, both ends are that end of it.
+    return low - below / (above - below) * (high - low)
 
 
 def _slope(x: ca.SX, u: ca.SX, half: ca.SX) -> ca.SX:

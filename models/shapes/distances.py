@@ -7,6 +7,7 @@ import casadi as ca
 
 from models.shapes.cuboids import point_to_box, segment_to_box
 from models.shapes.gap import Gap
+from models.shapes.pose import Pose
 from models.shapes.polyhedra import nearest_features, polyhedron_to_polyhedron
 from models.shapes.segments import point_to_segment, segment_to_segment
 from models.shapes.shapes import Capsule, ConvexHull, Cuboid, HalfSpace, Rounded, Shape, Sphere
@@ -101,12 +102,20 @@ def distance_smoothness(a: Shape, b: Shape) -> Literal[0, 1, 2]:
 def _sorted(a: Shape, b: Shape) -> tuple[Rounded, Shape]:
     check_instance(a, Shape, "distance: the first shape")
     check_instance(b, Shape, "distance: the second shape")
-    first, second = sorted((a, b), key=lambda shape: _ORDER.index(type(shape)))
+    simplest = (_simplest(a), _simplest(b))
+    first, second = sorted(simplest, key=lambda shape: _ORDER.index(type(shape)))
     if not isinstance(first, Rounded):
         raise ProblemError(
             "distance: two half-spaces overlap unless they are opposite; compare each with a body"
         )
     return first, second
+
+
+def _simplest(shape: Shape) -> Shape:
+    """Return a capsule without length as the ball that it is."""
+    if isinstance(shape, Capsule) and shape.is_ball:
+        return Sphere(shape.radius, pose=shape.pose @ Pose(position=shape.start))
+    return shape
 
 
 def _gap(first: Rounded, second: Shape, *, signed: bool) -> Gap:

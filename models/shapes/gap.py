@@ -25,6 +25,8 @@ import casadi as ca
 _ROOT = 1e-20
 # Added to squared lengths [m^2] that may be zero: 0 / 0 is then 0.
 TINY = 1e-30
+# A slope that changes no value, and whose square is zero.
+_HARDLY = 1e-200
 # Edges whose directions differ by less than the root of this are parallel [rad^2].
 PARALLEL = 1e-12
 
@@ -71,31 +73,23 @@ class Gap(NamedTuple):
         return self.w - along * self.line
 
 
-def piecewise_constant(
-    name: str, given: list, outputs: list, names: tuple[list[str], list[str]]
-) -> ca.Function:
-    """Return a call node whose outputs are constant wherever they do not jump.
+def piecewise_constant(name: str, given: ca.SX | ca.MX, choice: ca.SX | ca.MX) -> ca.Function:
+    """Return a call node (n,) -> (m,) whose value is constant wherever it does not jump.
 
-    Its derivatives are zero, and what is inside is not searched for jumps: a distance has none.
+    Its derivatives are as good as zero and cost nothing, and what is inside is not searched for
+    jumps: a distance has none. As good as zero, since of a call without any derivative CasADi
+    (3.8.2) loses the value in second derivatives.
 
     Args:
         name: of the function.
-        given: its inputs, symbols of SX or of MX.
-        outputs: what it returns.
-        names: of inputs and outputs.
+        given: its argument, a column of symbols.
+        choice: what it returns, a column.
     """
-    kind = type(given[0])
-    sizes = [(o.numel(), i.numel()) for o in outputs for i in given]
-    symbols = [*given, *[kind.sym(n, *o.shape) for n, o in zip(names[1], outputs, strict=True)]]
-    zeros = ca.Function(
-        f"jac_{name}",
-        symbols,
-        [kind(*size) for size in sizes],
-        [*names[0], *[f"out_{n}" for n in names[1]]],
-        [f"jac_{o}_{i}" for o in names[1] for i in names[0]],
-    )
-    options = {"never_inline": True, "custom_jacobian": zeros, "jac_penalty": 0}
-    return ca.Function(name, given, [ca.densify(o) for o in outputs], *names, options)
+    options = {"never_inline": True, "is_diff_in": [False], "is_diff_out": [False]}
+    decide = ca.Function(name, [given], [ca.densify(choice)], options)
+    x = ca.MX.sym("x", given.numel())
+    value = decide(x) + _HARDLY * ca.sum1(x)
+    return ca.Function(name, [x], [value], {"never_inline": True})
 
 
 def clamped(value: ca.SX) -> ca.SX:

@@ -7,6 +7,7 @@ tables in a call node, which evaluates the second only where it is needed.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -22,8 +23,9 @@ _NAMES = ["a", "b", "face_a", "face_b", "cross_a", "cross_b", "line_a", "line_b"
 _FAR = 1e300
 # A face contains the foot of a vertex up to this, relative to the size of the face.
 _INSIDE = 1e-12
-# The planes through the nearest points may be crossed by this part of the distance: rounding.
-_CERTAIN = 1e-6
+# The planes through the nearest points are as far apart as these, or not at all where the bodies
+# overlap. Half of it tells the cases apart, whatever rounding does.
+_CERTAIN = 0.5
 
 
 def polyhedron_to_polyhedron(choice: ca.Function, rotation: ca.SX, shift: ca.SX) -> Gap:
@@ -34,8 +36,9 @@ def polyhedron_to_polyhedron(choice: ca.Function, rotation: ca.SX, shift: ca.SX)
         rotation: of the second in the frame of the first (3, 3).
         shift: where its origin is there (3,) [m].
     """
-    found = choice(ca.densify(rotation), ca.densify(shift))
-    a, b, face_a, face_b, cross_a, cross_b, line_a, line_b, has_plane = found
+    found = choice(ca.densify(ca.vertcat(ca.vec(rotation), shift)))
+    columns = ca.vertsplit(found, np.cumsum([0, *_SIZES]).tolist())
+    a, b, face_a, face_b, cross_a, cross_b, line_a, line_b, has_plane = columns
 
     def turned(each: ca.SX) -> ca.SX:
         return ca.mtimes(rotation, each)
@@ -48,10 +51,11 @@ def polyhedron_to_polyhedron(choice: ca.Function, rotation: ca.SX, shift: ca.SX)
     )
 
 
+# Many links and obstacles have one form: their node is made once.
+@lru_cache(maxsize=64)
 def nearest_features(first: Polyhedron, second: Polyhedron) -> ca.Function:
-    """Return the call node (rotation, shift of the second) -> features of both."""
-    rotation, shift = ca.MX.sym("rotation", 3, 3), ca.MX.sym("shift", 3)
-    pose = ca.vertcat(ca.vec(rotation), shift)
+    """Return the call node (rotation and shift of the second, (12,)) -> features of both."""
+    pose = ca.MX.sym("pose", 12)
     apart = [_edges(first, second, pose)]
     for one, other, swapped in ((first, second, False), (second, first, True)):
         if len(one.triangles):
@@ -59,9 +63,7 @@ def nearest_features(first: Polyhedron, second: Polyhedron) -> ca.Function:
     choice = _least(apart)
     if len(first.triangles) or len(second.triangles):
         choice = _certain_or_deepest(first, second, pose, choice)
-    outputs = ca.vertsplit(choice, np.cumsum([0, *_SIZES]).tolist())
-    names = ["rotation", "shift"], _NAMES
-    return piecewise_constant("nearest_features", [rotation, shift], outputs, names)
+    return piecewise_constant("nearest_features", pose, choice)
 
 
 class _Place:
@@ -121,7 +123,11 @@ def _edges(first: Polyhedron, second: Polyhedron, pose: ca.MX) -> tuple[ca.MX, c
         u, v = p_end - p, q_end - q
         turned, r = ca.mtimes(place.R, v), place.of(q) - p
         s, t, s_free, t_free = nearest_on_segments(
-            ca.sumsqr(u), ca.dot(u, turned), ca.sumsqr(v), ca.dot(u, r), ca.dot(turned, r)
+            ca.sumsqr(u) + TINY,  # a point is an edge without length
+            ca.dot(u, turned),
+            ca.sumsqr(v) + TINY,
+            ca.dot(u, r),
+            ca.dot(turned, r),
         )
         w = r + t * turned - s * u
         both = s_free * t_free
@@ -194,7 +200,7 @@ def _certain_or_deepest(
     a, b = given[:3], place.of(given[3:6])
     w = b - a
     low, high = _reach(first, second, place, w)
-    certain = low - high >= (1.0 - _CERTAIN) * ca.sumsqr(w)
+    certain = low - high >= _CERTAIN * ca.sumsqr(w)
     is_certain = ca.Function("is_certain", [where, given], [ca.logic_and(certain, ca.sumsqr(w) > 0)])
     at, found = ca.MX.sym("pose", 12), ca.MX.sym("choice", sum(_SIZES))
     select = ca.Function.if_else(

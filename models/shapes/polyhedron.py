@@ -50,6 +50,13 @@ class Polyhedron:
         normals = found.equations[:, :3]
         return cls(points[kept], _edges(triangles, normals), triangles, normals)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the other has the same vertices, in the same order."""
+        return isinstance(other, Polyhedron) and np.array_equal(self.vertices, other.vertices)
+
+    def __hash__(self) -> int:
+        return hash(self.vertices.tobytes())
+
     @property
     def directions(self) -> np.ndarray:
         """Unit vectors along its edges, each once, (d, 3)."""

@@ -15,6 +15,9 @@ from models.shapes.pose import Coordinates, Pose
 from ocp import ProblemError
 from ocp.internal import Portable, check_instance, check_not_negative, check_positive
 
+# A capsule that is shorter is a ball [m].
+_LENGTH = 1e-12
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shape(Portable, ABC):
@@ -131,6 +134,11 @@ class Capsule(Rounded):
         """The radius [m]."""
         return self.radius
 
+    @property
+    def is_ball(self) -> bool:
+        """Whether it has no length."""
+        return float(np.linalg.norm(np.asarray(self.end) - np.asarray(self.start))) < _LENGTH
+
     @cached_property
     def core(self) -> Polyhedron:
         """The segment."""
@@ -235,7 +243,7 @@ class HalfSpace(Shape):
 
     Args:
         normal: out of the half-space (3,), of any length but zero, in its frame.
-        offset: along the normal, in units of its length [m]: n'y <= offset |n| is inside.
+        offset: how far along the normal the plane is from the origin of its frame [m].
         pose: where it is.
 
     Raises:
