@@ -62,7 +62,9 @@ def free_body_ocp(
     _check_bodies(bodies, obstacles, name)
     count = np.size(start)
     if count not in (3, 5):
-        raise ProblemError(f"{name}: start has {count} entries, 3 or 5 (with two angles) are needed")
+        raise ProblemError(
+            f"{name}: start has {count} entries, 3 or 5 (with two angles) are needed"
+        )
     ends = [vector(v, count, f"{name}: {w}") for v, w in ((start, "start"), (goal, "goal"))]
     duration = check_positive(horizon, f"{name}: horizon")
     least = check_real(margin, f"{name}: margin")
@@ -88,7 +90,9 @@ def free_body_ocp(
         control_bounds=Box(-bound, bound) if np.isfinite(limit) else Box(),
         constraints=(
             *clearances(moved, obstacles, least),
-            Constraint("goal", x - ca.vertcat(ca.DM(ends[1]), ca.DM.zeros(count)), 0.0, 0.0, "terminal"),
+            Constraint(
+                "goal", x - ca.vertcat(ca.DM(ends[1]), ca.DM.zeros(count)), 0.0, 0.0, "terminal"
+            ),
         ),
         parameters=tuple(parameters),
     )

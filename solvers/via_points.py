@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp import OCP, Guess, ProblemError
-from ocp.internal import check_instance, check_positive, check_whole
+from ocp import OCP, Box, Constraint, Guess, ProblemError
+from ocp.internal import check_instance, check_numbers, check_positive, check_whole
 
 # Instants at which a guess is looked at.
 _SAMPLES = 41
@@ -43,8 +43,8 @@ def via_point_guesses(
         goal: the state at the end (nx,).
         number: how many, at most: of those that go the same way round only the best is kept.
         seed: the same seed gives the same guesses.
-        moving: indices or names of the states that z changes, such as positions; None: those that
-            differ between start and goal.
+        moving: indices or names of the states that z changes, such as positions; None: those on
+            which the path constraints without controls depend.
         spread: standard deviation of z in each of them; None: half the distance from start to goal.
         candidates: how many are drawn.
 
@@ -55,15 +55,16 @@ def via_point_guesses(
     check_whole(number, "via points: number")
     check_whole(seed, "via points: seed", least=0)
     check_whole(candidates, "via points: candidates", least=number)
-    start, end = ocp.start(), _goal(ocp, goal)
-    chosen = _indices(ocp, moving, end - start)
-    width = float(np.linalg.norm((end - start)[chosen])) / 2.0 if spread is None else spread
-    check_positive(width, "via points: spread")
+    start = ocp.start()
+    end = check_numbers(goal, ocp.model.nx, "via points: goal", repeat=False)
+    chosen = _indices(ocp, moving)
+    half = float(np.linalg.norm((end - start)[chosen])) / 2.0
+    width = check_positive(half if spread is None else spread, "via points: spread")
+    s = np.linspace(0.0, 1.0, _SAMPLES)
     drawn = np.random.default_rng(seed).normal(size=(candidates, len(chosen))) * width
     drawn[0] = 0.0
     bumps = np.zeros((candidates, ocp.model.nx))
     bumps[:, chosen] = drawn
-    s = np.linspace(0.0, 1.0, _SAMPLES)
     line = start + np.outer(3 * s**2 - 2 * s**3, end - start)
     paths = line + np.sin(np.pi * s)[None, :, None] ** 2 * bumps[:, None, :]
     lengths = np.linalg.norm(np.diff(paths[..., chosen], axis=1), axis=2).sum(axis=1)
@@ -77,19 +78,11 @@ def via_point_guesses(
     return [Guess(x=paths[k]) for k in kept[:number]]
 
 
-def _goal(ocp: OCP, goal: ArrayLike) -> np.ndarray:
-    found = np.asarray(goal, dtype=float).reshape(-1)
-    if found.size != ocp.model.nx or not np.isfinite(found).all():
-        raise ProblemError(
-            f"via points: goal is {np.asarray(goal)}, {ocp.model.nx} finite numbers are needed, "
-            f"one for each state of '{ocp.name}'"
-        )
-    return found
-
-
-def _indices(ocp: OCP, moving: Sequence[int | str] | None, way: np.ndarray) -> list[int]:
+def _indices(ocp: OCP, moving: Sequence[int | str] | None) -> list[int]:
+    """Return the numbers of the states that move."""
     if moving is None:
-        found = np.flatnonzero(way).tolist()
+        slopes = ca.jacobian(_rows(ocp), ocp.model.x).sparsity()
+        found = sorted(set(slopes.get_col()))
     else:
         names = list(ocp.model.x_names)
         unknown = [m for m in moving if m not in (*names, *range(ocp.model.nx))]
@@ -100,30 +93,43 @@ def _indices(ocp: OCP, moving: Sequence[int | str] | None, way: np.ndarray) -> l
             )
         found = [names.index(m) if isinstance(m, str) else int(m) for m in moving]
     if not found:
-        raise ProblemError("via points: start and goal are the same; say which states move")
+        raise ProblemError(
+            "via points: no path constraint without controls depends on a state; say which "
+            "states move, as in moving=(0, 1)"
+        )
     return found
+
+
+def _avoided(ocp: OCP) -> list[Constraint]:
+    """Return the path constraints without controls."""
+    return [c for c in ocp.at("path") if not ca.depends_on(c.expression, ocp.model.u)]
+
+
+def _rows(ocp: OCP) -> ca.SX:
+    return ca.vertcat(ca.SX(0, 1), *[c.expression for c in _avoided(ocp)])
 
 
 def _violations(ocp: OCP, paths: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Return how much each path (k, n, nx) violates what has no control in it, on average."""
-    m = ocp.model
-    rows = [c for c in ocp.at("path") if not ca.depends_on(c.expression, m.u)]
-    values = ocp.parameter_values()
-    duration = float(ocp.horizon) if isinstance(ocp.horizon, int | float) else 1.0
-    total = _outside(paths, ocp.state_bounds.lower, ocp.state_bounds.upper).sum(axis=(1, 2))
-    if rows:
-        stacked = ca.vertcat(*[c.expression for c in rows])
-        given = ca.Function("rows", [m.x, m.t, ocp.p], [ca.densify(stacked)])
-        count = len(paths) * len(s)
-        p = np.tile(values.at(s), (len(paths), 1))
-        found = given.map(count)(
-            paths.reshape(count, -1).T, np.tile(s * duration, len(paths))[None, :], p.T
-        )
-        bounds = [np.concatenate([np.asarray(b) for b in side]) for side in zip(*[(c.lower, c.upper) for c in rows], strict=True)]
-        outside = _outside(np.array(found).T, *bounds)
-        total = total + outside.reshape(len(paths), -1).sum(axis=1)
-    return np.nan_to_num(total / len(s), nan=np.inf)
+    m, count = ocp.model, paths.shape[0] * len(s)
+    states = paths.reshape(count, -1)
+    total = _outside(states, ocp.state_bounds).sum(axis=1)
+    if avoided := _avoided(ocp):
+        duration = float(ocp.horizon) if isinstance(ocp.horizon, int | float) else 1.0
+        times = np.tile(s * duration, len(paths))
+        parameters = np.tile(ocp.parameter_values().at(s), (len(paths), 1))
+        rows = ca.Function("rows", [m.x, m.t, ocp.p], [ca.densify(_rows(ocp))]).map(count)
+        values = np.array(rows(states.T, times[None, :], parameters.T)).T
+        bounds = Box(*[np.concatenate(side) for side in zip(*map(_sides, avoided), strict=True)])
+        total = total + _outside(values, bounds).sum(axis=1)
+    return np.nan_to_num(total.reshape(len(paths), -1).mean(axis=1), nan=np.inf)
 
 
-def _outside(values: np.ndarray, lower: ArrayLike, upper: ArrayLike) -> np.ndarray:
-    return np.maximum(0.0, np.maximum(np.asarray(lower) - values, values - np.asarray(upper)))
+def _sides(c: Constraint) -> tuple[np.ndarray, np.ndarray]:
+    return np.asarray(c.lower), np.asarray(c.upper)
+
+
+def _outside(values: np.ndarray, box: Box) -> np.ndarray:
+    """Return how far values (k, n) are outside of a box."""
+    lower, upper = np.asarray(box.lower), np.asarray(box.upper)
+    return np.maximum(0.0, np.maximum(lower - values, values - upper))

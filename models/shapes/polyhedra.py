@@ -115,7 +115,9 @@ def _choice(**parts: ca.SX) -> ca.SX:
 
 def _edges(first: Polyhedron, second: Polyhedron, pose: ca.MX) -> tuple[ca.MX, ca.MX]:
     """Return squared distance and choice of the nearest edges."""
-    ends = [np.hstack([b.vertices[b.edges[:, 0]], b.vertices[b.edges[:, 1]]]) for b in (first, second)]
+    ends = [
+        np.hstack([b.vertices[b.edges[:, 0]], b.vertices[b.edges[:, 1]]]) for b in (first, second)
+    ]
     table = np.array([np.hstack([one, other]) for one in ends[0] for other in ends[1]]).T
 
     def candidate(place: _Place, column: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -191,9 +193,7 @@ def _face_choice(on_face: ca.SX, vertex: ca.SX, n: ca.SX, swapped: bool) -> ca.S
     return _choice(a=on_face, b=vertex, face_a=n, has_plane=one)
 
 
-def _certain_or_deepest(
-    first: Polyhedron, second: Polyhedron, pose: ca.MX, choice: ca.MX
-) -> ca.MX:
+def _certain_or_deepest(first: Polyhedron, second: Polyhedron, pose: ca.MX, choice: ca.MX) -> ca.MX:
     """Return the choice if planes part the bodies at its points; else the deepest one."""
     where, given = ca.SX.sym("pose", 12), ca.SX.sym("choice", sum(_SIZES))
     place = _Place(where)
@@ -201,7 +201,9 @@ def _certain_or_deepest(
     w = b - a
     low, high = _reach(first, second, place, w)
     certain = low - high >= _CERTAIN * ca.sumsqr(w)
-    is_certain = ca.Function("is_certain", [where, given], [ca.logic_and(certain, ca.sumsqr(w) > 0)])
+    is_certain = ca.Function(
+        "is_certain", [where, given], [ca.logic_and(certain, ca.sumsqr(w) > 0)]
+    )
     at, found = ca.MX.sym("pose", 12), ca.MX.sym("choice", sum(_SIZES))
     select = ca.Function.if_else(
         "certain_or_deepest",
@@ -211,9 +213,7 @@ def _certain_or_deepest(
     return select(is_certain(pose, choice), pose, choice)
 
 
-def _reach(
-    first: Polyhedron, second: Polyhedron, place: _Place, n: ca.SX
-) -> tuple[ca.SX, ca.SX]:
+def _reach(first: Polyhedron, second: Polyhedron, place: _Place, n: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return how far the second begins, and how far the first ends, along n."""
     seen = ca.mtimes(place.R.T, n)
     low = ca.mmin(ca.mtimes(ca.DM(second.vertices), seen)) + ca.dot(n, place.p)

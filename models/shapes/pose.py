@@ -53,9 +53,7 @@ class Pose(Portable):
 
     def __matmul__(self, inner: "Pose") -> "Pose":
         """Return the pose of what has the pose ``inner`` in this body."""
-        return Pose(
-            _plain(ca.mtimes(self.R, inner.R)), _plain(ca.mtimes(self.R, inner.p) + self.p)
-        )
+        return Pose(_plain(ca.mtimes(self.R, inner.R)), _plain(ca.mtimes(self.R, inner.p) + self.p))
 
     def of(self, points: ca.SX | ca.DM) -> ca.SX:
         """Return where points (3, k) of the body are [m]."""
