@@ -39,8 +39,8 @@ def free_body_ocp(
         \min \int |a|^2 + \rho^2 |\alpha|^2 \, dt, \quad
         \ddot p = a, \; (\ddot\psi, \ddot\vartheta) = \alpha, \quad d_{ij} \ge d
 
-    The position p is that of the body's frame, yaw ψ turns it about the vertical, then pitch ϑ about
-    its own y axis: R = R_z(ψ) R_y(ϑ). A capsule or a drone needs no third angle. ρ = 0.3 m.
+    The position p is that of the body's frame, yaw ψ turns it about the vertical, then pitch ϑ
+    about its own y axis: R = R_z(ψ) R_y(ϑ). A capsule or a drone needs no third angle. ρ = 0.3 m.
 
     Args:
         bodies: the parts of the body, in its frame, with numbers for poses.

@@ -7,8 +7,8 @@ import casadi as ca
 
 from models.shapes.cuboids import point_to_box, segment_to_box
 from models.shapes.gap import Gap
-from models.shapes.pose import Pose
 from models.shapes.polyhedra import nearest_features, polyhedron_to_polyhedron
+from models.shapes.pose import Pose
 from models.shapes.segments import point_to_segment, segment_to_segment
 from models.shapes.shapes import Capsule, ConvexHull, Cuboid, HalfSpace, Rounded, Shape, Sphere
 from ocp import ProblemError
@@ -45,7 +45,8 @@ def distance(a: Shape, b: Shape) -> ca.SX:
     first, second = _sorted(a, b)
     if isinstance(second, HalfSpace):
         return reduce(ca.fmin, ca.vertsplit(heights(first, second)))
-    return _gap(first, second, signed=True).distance - first.margin - second.margin
+    radii = first.radius + second.radius
+    return _gap(first, second, signed=True).distance - radii
 
 
 def squared_core_distance(a: Shape, b: Shape) -> ca.SX:
@@ -77,7 +78,7 @@ def heights(body: Rounded, ground: HalfSpace) -> ca.SX:
 
     Each is as smooth as the poses; their minimum, the distance, has kinks.
     """
-    return ground.heights(body.points) - body.margin
+    return ground.heights(body.points) - body.radius
 
 
 def distance_smoothness(a: Shape, b: Shape) -> Literal[0, 1, 2]:
@@ -99,12 +100,12 @@ def distance_smoothness(a: Shape, b: Shape) -> Literal[0, 1, 2]:
     return 0 if first.pose.turns or second.pose.turns else 1
 
 
-def _sorted(a: Shape, b: Shape) -> tuple[Rounded, Shape]:
+def _sorted(a: Shape, b: Shape) -> tuple[Rounded, Rounded | HalfSpace]:
     check_instance(a, Shape, "distance: the first shape")
     check_instance(b, Shape, "distance: the second shape")
     simplest = (_simplest(a), _simplest(b))
     first, second = sorted(simplest, key=lambda shape: _ORDER.index(type(shape)))
-    if not isinstance(first, Rounded):
+    if not isinstance(first, Rounded) or not isinstance(second, Rounded | HalfSpace):
         raise ProblemError(
             "distance: two half-spaces overlap unless they are opposite; compare each with a body"
         )
@@ -118,7 +119,7 @@ def _simplest(shape: Shape) -> Shape:
     return shape
 
 
-def _gap(first: Rounded, second: Shape, *, signed: bool) -> Gap:
+def _gap(first: Rounded, second: Rounded, *, signed: bool) -> Gap:
     """Return the gap of two cores, the simpler one first."""
     match first, second:
         case Sphere(), Sphere():
@@ -134,8 +135,6 @@ def _gap(first: Rounded, second: Shape, *, signed: bool) -> Gap:
             half = ca.DM(second.half)
             if isinstance(first, Sphere):
                 return point_to_box(ends[0], half)
-            return segment_to_box(*ends, half, signed=signed)
-        case Rounded(), Rounded():
-            choice = nearest_features(first.core, second.core)
-            return polyhedron_to_polyhedron(choice, *second.pose.seen_from(first.pose))
-    raise AssertionError(f"no distance from {first.kind} to {second.kind}")
+            return segment_to_box(ends[0], ends[1], half, signed=signed)
+    choice = nearest_features(first.core, second.core)
+    return polyhedron_to_polyhedron(choice, *second.pose.seen_from(first.pose))

@@ -12,11 +12,11 @@ Two points apart by w, one of each feature, and the directions in which the feat
     d = \frac{n'w}{|n|} \quad (\text{plane}), \qquad
     d = \Bigl| w - \frac{e'w}{e'e}\, e \Bigr| \quad (\text{line or point})
 
-where two directions span a plane with the normal n (a vertex on a face, an edge across an edge), one
-is e (a vertex on an edge), or there is none (two vertices).
+where two directions span a plane with the normal n (a vertex on a face, an edge across an edge),
+one is e (a vertex on an edge), or there is none (two vertices).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -73,7 +73,7 @@ class Gap(NamedTuple):
         return self.w - along * self.line
 
 
-def piecewise_constant(name: str, given: ca.SX | ca.MX, choice: ca.SX | ca.MX) -> ca.Function:
+def piecewise_constant(name: str, given: Any, choice: Any) -> ca.Function:
     """Return a call node (n,) -> (m,) whose value is constant wherever it does not jump.
 
     Its derivatives are as good as zero and cost nothing, and what is inside is not searched for
@@ -82,7 +82,7 @@ def piecewise_constant(name: str, given: ca.SX | ca.MX, choice: ca.SX | ca.MX) -
 
     Args:
         name: of the function.
-        given: its argument, a column of symbols.
+        given: its argument, a column of symbols of SX or MX.
         choice: what it returns, a column.
     """
     options = {"never_inline": True, "is_diff_in": [False], "is_diff_out": [False]}

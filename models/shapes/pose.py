@@ -37,7 +37,7 @@ class Pose(Portable):
         object.__setattr__(self, "position", coordinates(self.position, "pose: position"))
 
     @property
-    def R(self) -> ca.SX:  # noqa: N802 the letter of the mathematics
+    def R(self) -> ca.SX:
         """The rotation (3, 3); its zeros are structural."""
         return _expression(self.rotation)
 

@@ -28,8 +28,9 @@ def places_on_segments(
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return s and t where p + s u and q + t v are nearest, and whether u and v cross.
 
-    From the products of u, v, neither zero, and r = q - p: s on the whole lines, cut to [0, 1]; t for it, cut; s
-    for that, cut [Ericson 2005, 5.1.9]. Of parallel segments one of the nearest pairs is taken.
+    From the products of u, v, neither zero, and r = q - p: s on the whole lines, cut to [0, 1];
+    t for it, cut; s for that, cut [Ericson 2005, 5.1.9]. Of parallel segments one of the nearest
+    pairs is taken.
     """
     across = uu * vv - uv**2
     crosses = across > PARALLEL * uu * vv

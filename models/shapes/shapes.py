@@ -48,24 +48,28 @@ class Shape(Portable, ABC):
         return self.placed(Pose(np.eye(3) if rotation is None else rotation, position))
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class Rounded(Shape):
-    """A bounded shape: its core is a point, a segment or a polyhedron."""
+    """A bounded shape: its core is a point, a segment or a polyhedron.
 
-    @property
-    @abstractmethod
-    def margin(self) -> float:
-        """The radius around the core [m]."""
+    Attributes:
+        radius: around the core [m].
+    """
 
-    @property
-    @abstractmethod
+    radius: float
+
+    @cached_property
     def core(self) -> Polyhedron:
         """The core in the shape's own frame."""
+        return self._core()
 
     @property
     def points(self) -> ca.SX:
         """Where the vertices of the core are (3, k) [m]."""
         return self.pose.of(ca.sparsify(ca.DM(self.core.vertices.T)))
+
+    @abstractmethod
+    def _core(self) -> Polyhedron:
+        """Return the core."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +91,7 @@ class Sphere(Rounded):
         super().__post_init__()
         object.__setattr__(self, "radius", check_not_negative(self.radius, "Sphere: radius"))
 
-    @property
-    def margin(self) -> float:
-        """The radius [m]."""
-        return self.radius
-
-    @cached_property
-    def core(self) -> Polyhedron:
-        """The centre."""
+    def _core(self) -> Polyhedron:
         return Polyhedron.segment(np.zeros(3), np.zeros(3))
 
     @property
@@ -130,18 +127,11 @@ class Capsule(Rounded):
         object.__setattr__(self, "radius", check_not_negative(self.radius, "Capsule: radius"))
 
     @property
-    def margin(self) -> float:
-        """The radius [m]."""
-        return self.radius
-
-    @property
     def is_ball(self) -> bool:
         """Whether it has no length."""
         return float(np.linalg.norm(np.asarray(self.end) - np.asarray(self.start))) < _LENGTH
 
-    @cached_property
-    def core(self) -> Polyhedron:
-        """The segment."""
+    def _core(self) -> Polyhedron:
         return Polyhedron.segment(self.start, self.end)
 
 
@@ -171,18 +161,11 @@ class Cuboid(Rounded):
         object.__setattr__(self, "radius", check_not_negative(self.radius, "Cuboid: radius"))
 
     @property
-    def margin(self) -> float:
-        """The radius [m]."""
-        return self.radius
-
-    @property
     def half(self) -> np.ndarray:
         """Half the lengths of its edges (3,) [m]."""
         return np.asarray(self.size) / 2.0
 
-    @cached_property
-    def core(self) -> Polyhedron:
-        """The box itself."""
+    def _core(self) -> Polyhedron:
         signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
         return Polyhedron.hull(signs * self.half)
 
@@ -226,14 +209,7 @@ class ConvexHull(Rounded):
         corners = np.setdiff1d(np.arange(len(found)), inner_points(found))
         return cls(found[corners], radius)
 
-    @property
-    def margin(self) -> float:
-        """The radius [m]."""
-        return self.radius
-
-    @cached_property
-    def core(self) -> Polyhedron:
-        """The hull itself."""
+    def _core(self) -> Polyhedron:
         return Polyhedron.hull(np.asarray(self.vertices))
 
 

@@ -1,5 +1,8 @@
 """Shapes to be compared, poses, and the same shapes for coal."""
 
+# coal has no stubs, its names are made at import:
+# pyright: reportAttributeAccessIssue=false
+
 from functools import cache
 from itertools import combinations_with_replacement
 
@@ -49,7 +52,7 @@ def derivatives(first: str, second: str) -> ca.Function:
 
 def poses(rng: np.random.Generator, number: int, size: float = 1.0) -> np.ndarray:
     """Random poses of two bodies (number, 14)."""
-    turns = [Rotation.random(number, random_state=rng).as_quat() for _ in range(2)]
+    turns = [Rotation.random(number, rng=rng).as_quat() for _ in range(2)]
     places = rng.normal(size=(2, number, 3)) * size
     return np.hstack([places[0], turns[0], places[1], turns[1]])
 

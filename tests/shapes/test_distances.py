@@ -84,7 +84,7 @@ def test_nearly_parallel_capsules(angle: float, shift: float) -> None:
     other = Capsule([-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], 0.05).at([shift, 0.0, 0.5], turn)
     grid = np.linspace(-0.5, 0.5, 401)
     # Brute force along one, the exact distance of a point from the other.
-    points = np.outer(grid, [c, s, 0.0]) + [shift, 0.0, 0.5]
+    points = np.outer(grid, [c, s, 0.0]) + np.array([shift, 0.0, 0.5])
     brute = np.hypot(
         np.linalg.norm(points[:, 1:], axis=1), np.maximum(0.0, points[:, 0] - 0.5)
     ).min()
@@ -141,7 +141,7 @@ def test_squares_are_those_of_the_cores() -> None:
         a, b = SHAPES[first], SHAPES[second]
         p = rng.normal(size=3) * 3.0
         square = float(ca.evalf(squared_core_distance(a, b.at(p))))
-        radii = sum(shape.margin for shape in (a, b))  # type: ignore[attr-defined] all are rounded
+        radii = sum(shape.radius for shape in (a, b))  # type: ignore[attr-defined] all are rounded
         assert numeric(a, b.at(p)) == pytest.approx(np.sqrt(square) - radii, abs=1e-9)
 
 

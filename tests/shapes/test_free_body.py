@@ -1,5 +1,8 @@
 """A body among five obstacles: clear between the nodes, audited with coal; moving obstacles."""
 
+# coal has no stubs, its names are made at import:
+# pyright: reportAttributeAccessIssue=false
+
 from typing import Any
 
 import casadi as ca
