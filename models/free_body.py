@@ -1,6 +1,6 @@
 """A free rigid body that goes from one pose to another among obstacles."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import casadi as ca
 import numpy as np
@@ -70,12 +70,11 @@ def free_body_ocp(
     least = check_real(margin, f"{name}: margin")
     limit = check_positive(acceleration, f"{name}: acceleration", finite=False)
     for place, what, at in ((ends[0], "start", 0), (ends[1], "goal", -1)):
-        for i, body in enumerate(bodies):
-            for j, obstacle in enumerate(obstacles):
-                rows = clearance_rows(body.placed(pose_of(ca.SX(ca.DM(place)))), obstacle)
-                pair = f"{name}: {what}: {pair_name(i, body, j, obstacle)}"
-                values = sampled(rows, time, duration, parameters, pair)[1]
-                _refuse_overlap(float(values[at].min()), least, pair)
+        pose = pose_of(ca.SX(ca.DM(place)))
+        for pair, rows in _pairs([body.placed(pose) for body in bodies], obstacles):
+            said = f"{name}: {what}: {pair}"
+            apart = sampled(rows, time, duration, parameters, said)[1][at]
+            _refuse_overlap(float(apart.min()), least, said)
 
     x, u = ca.SX.sym("x", 2 * count), ca.SX.sym("u", count)
     moved = [body.placed(pose_of(x[:count])) for body in bodies]
@@ -133,6 +132,13 @@ def _check_bodies(bodies: Sequence[Shape], obstacles: Sequence[Shape], name: str
                 f"{name}: bodies[{i}] has an expression for a pose; place it by numbers in the "
                 "body's frame"
             )
+
+
+def _pairs(bodies: Sequence[Shape], obstacles: Sequence[Shape]) -> Iterator[tuple[str, ca.SX]]:
+    """Yield the name and the clearance of every body and obstacle."""
+    for i, body in enumerate(bodies):
+        for j, obstacle in enumerate(obstacles):
+            yield pair_name(i, body, j, obstacle), clearance_rows(body, obstacle)
 
 
 def _refuse_overlap(apart: float, least: float, pair: str) -> None:

@@ -4,7 +4,8 @@ from functools import cache, reduce
 
 import casadi as ca
 
-from models.shapes.gap import PARALLEL, TINY, Gap, clamped, piecewise_constant
+from models.shapes.gap import PARALLEL, TINY, Gap, clamped
+from ocp.internal import piecewise_constant
 
 _AXES = range(3)
 # More than any slope [m^2].

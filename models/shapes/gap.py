@@ -16,7 +16,7 @@ where two directions span a plane with the normal n (a vertex on a face, an edge
 one is e (a vertex on an edge), or there is none (two vertices).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -25,8 +25,6 @@ import casadi as ca
 _ROOT = 1e-20
 # Added to squared lengths [m^2] that may be zero: 0 / 0 is then 0.
 TINY = 1e-30
-# A slope that changes no value, and whose square is zero.
-_HARDLY = 1e-200
 # Edges whose directions differ by less than the root of this are parallel [rad^2].
 PARALLEL = 1e-12
 
@@ -71,25 +69,6 @@ class Gap(NamedTuple):
     def _beside(self) -> ca.SX:
         along = ca.dot(self.line, self.w) / (ca.sumsqr(self.line) + TINY)
         return self.w - along * self.line
-
-
-def piecewise_constant(name: str, given: Any, choice: Any) -> ca.Function:
-    """Return a call node (n,) -> (m,) whose value is constant wherever it does not jump.
-
-    Its derivatives are as good as zero and cost nothing, and what is inside is not searched for
-    jumps: a distance has none. As good as zero, since of a call without any derivative CasADi
-    (3.8.2) loses the value in second derivatives.
-
-    Args:
-        name: of the function.
-        given: its argument, a column of symbols of SX or MX.
-        choice: what it returns, a column.
-    """
-    options = {"never_inline": True, "is_diff_in": [False], "is_diff_out": [False]}
-    decide = ca.Function(name, [given], [ca.densify(choice)], options)
-    x = ca.MX.sym("x", given.numel())
-    value = decide(x) + _HARDLY * ca.sum1(x)
-    return ca.Function(name, [x], [value], {"never_inline": True})
 
 
 def clamped(value: ca.SX) -> ca.SX:

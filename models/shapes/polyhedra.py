@@ -12,9 +12,10 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from models.shapes.gap import PARALLEL, TINY, Gap, piecewise_constant
+from models.shapes.gap import PARALLEL, TINY, Gap
 from models.shapes.polyhedron import Polyhedron
 from models.shapes.segments import nearest_on_segments
+from ocp.internal import piecewise_constant
 
 # The columns of a choice: points of both bodies, each in its own frame, the normal of a face, the
 # directions of crossing edges, the directions of a line, and whether there is a plane.

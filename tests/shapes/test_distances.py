@@ -12,7 +12,6 @@ from models.shapes import (
     Shape,
     Sphere,
     distance,
-    distance_smoothness,
     squared_core_distance,
 )
 from models.shapes.cuboids import segment_to_box
@@ -175,19 +174,6 @@ def _operations(function: ca.Function) -> int:
         elif operation not in (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST):
             count += 1 if is_scalar else function.instruction_MX(k).nnz()
     return count
-
-
-def test_smoothness() -> None:
-    x = ca.SX.sym("x", 5)
-    c, s, zero, one = ca.cos(x[3]), ca.sin(x[3]), ca.SX(0), ca.SX(1)
-    turn = ca.vertcat(ca.horzcat(c, -s, zero), ca.horzcat(s, c, zero), ca.horzcat(zero, zero, one))
-    ball, rod, box = Sphere(0.1).at(x[:3]), Capsule([0, 0, 0], [1, 0, 0], 0.1), Cuboid([1, 1, 1])
-    assert distance_smoothness(ball, Sphere(0.1)) == 2
-    assert distance_smoothness(ball, HalfSpace(AXIS)) == 2
-    assert distance_smoothness(ball, box.at(x[:3], turn)) == 1
-    assert distance_smoothness(rod.at(x[:3]), box) == 1
-    assert distance_smoothness(rod.at(x[:3], turn), box) == 0
-    assert distance_smoothness(rod.at(x[:3], turn), HalfSpace(AXIS)) == 0
 
 
 def test_a_hull_with_the_corners_of_a_box_is_a_box() -> None:
