@@ -26,9 +26,10 @@ def piecewise_constant(name: str, given: Any, choice: Any) -> ca.Function:
         given: its argument, a column of symbols of SX or MX.
         choice: what it returns, a column.
     """
-    options = {"never_inline": True, "is_diff_in": [False], "is_diff_out": [False]}
+    # Declared for inputs alone: with outputs as well, derivatives of SX are NaN.
+    options = {"never_inline": True, "is_diff_in": [False]}
     decide = ca.Function(f"decide_{name}", [given], [ca.densify(choice)], options)
-    x = ca.MX.sym("x", given.numel())
+    x = type(given).sym("x", given.numel())
     value = decide(x) + _HARDLY * ca.sum1(x)
     return ca.Function(name, [x], [value], ["x"], [_CHOICE], {"never_inline": True})
 
