@@ -101,15 +101,22 @@ def distance_smoothness(a: Shape, b: Shape) -> Literal[0, 1, 2]:
 
 
 def _sorted(a: Shape, b: Shape) -> tuple[Rounded, Rounded | HalfSpace]:
-    check_instance(a, Shape, "distance: the first shape")
-    check_instance(b, Shape, "distance: the second shape")
-    simplest = (_simplest(a), _simplest(b))
-    first, second = sorted(simplest, key=lambda shape: _ORDER.index(type(shape)))
+    """Return two shapes, the simpler one first."""
+    for shape, which in ((a, "first"), (b, "second")):
+        check_instance(shape, Shape, f"distance: the {which} shape")
+        if not isinstance(shape, _ORDER):
+            known = ", ".join(kind.__name__ for kind in _ORDER)
+            raise ProblemError(f"distance: {shape.kind} is none of {known}")
+    first, second = sorted((_simplest(a), _simplest(b)), key=_rank)
     if not isinstance(first, Rounded) or not isinstance(second, Rounded | HalfSpace):
         raise ProblemError(
             "distance: two half-spaces overlap unless they are opposite; compare each with a body"
         )
     return first, second
+
+
+def _rank(shape: Shape) -> int:
+    return next(i for i, kind in enumerate(_ORDER) if isinstance(shape, kind))
 
 
 def _simplest(shape: Shape) -> Shape:

@@ -16,6 +16,7 @@ from models.shapes import (
     Cuboid,
     HalfSpace,
     Pose,
+    Shape,
     Sphere,
     clearance,
     clearances,
@@ -23,6 +24,11 @@ from models.shapes import (
     squared_core_distance,
 )
 from ocp import ProblemError
+
+
+class Torus(Shape):
+    """A shape that is not convex."""
+
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
 FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.2, 0]]
@@ -63,6 +69,7 @@ FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.2, 0]]
         (lambda: distance(Sphere(1.0), [0, 0, 0]), "the second shape is a list, Shape is needed"),
         (lambda: distance(Sphere, Sphere(1.0)), r"the class Sphere.*: write Sphere\(...\)"),
         (lambda: distance(HalfSpace([0, 0, 1]), HalfSpace([0, 1, 0])), "two half-spaces"),
+        (lambda: distance(Torus(), Sphere(1.0)), "Torus is none of Sphere, Capsule, Cuboid"),
         (lambda: squared_core_distance(Sphere(1.0), HalfSpace([0, 1, 0])), "a half-space has none"),
         (lambda: clearance(Sphere(1.0), Sphere(1.0)), "neither moves"),
         (lambda: clearance(Sphere(1.0), Sphere(1.0), np.nan), "clearance: margin = nan"),

@@ -26,7 +26,7 @@ ROD, BOX = Capsule([-0.5, 0, 0], [0.5, 0, 0], 0.1), Cuboid([0.8, 0.4, 0.4])
         (Sphere(0.1).at(x), HalfSpace([0, 0, 1]), 2),
         (Sphere(0.1).at(x), PLATE, 1),
         (Sphere(0.1).at(x), ROD, 1),
-        (ROD.at(x), PLATE, 1),
+        pytest.param(ROD.at(x), PLATE, 1, marks=pytest.mark.slow),
         (ROD.at(x, TURN), PLATE, 0),
         pytest.param(BOX.at(x, TURN), PLATE, 0, marks=pytest.mark.slow),
         (ROD.at(x, TURN), HalfSpace([0, 0, 1], -2.0), 0),
@@ -37,6 +37,8 @@ def test_what_is_said_is_what_is_found(moving: Shape, other: Shape, expected: in
     assert distance_smoothness(moving, other) == expected
     assert distance_smoothness(other, moving) == expected
     for declared in (0, 1, 2):
+        if declared not in (expected, expected + 1):
+            continue
         ocp = OCP(
             name="near",
             model=Model(name="body", x=ca.vertcat(x, angle), u=u, f=u),
