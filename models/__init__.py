@@ -7,6 +7,7 @@ from models.carima_ocp import carima_ocp
 from models.cart_pole import CartPole, cart_pole_swing_up, cart_pole_upright
 from models.distance_cost import Combine, DistanceCost
 from models.distances import distance_to_segment, signed_distance
+from models.free_body import free_body_ocp
 from models.linear import LinearPlant, mass_spring_damper, stable_plant, state_space, unstable_plant
 from models.linear_problems import (
     lq_regulator,
@@ -54,6 +55,7 @@ __all__ = [
     "cart_pole_upright",
     "clearance_constraint",
     "distance_to_segment",
+    "free_body_ocp",
     "line",
     "link_distances",
     "lq_regulator",

@@ -16,6 +16,7 @@ from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
 from ocp.expressions.foreign_functions import external
+from ocp.expressions.piecewise_constant import deciding, piecewise_constant
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
 from ocp.files.draft import replacing, write_file
@@ -130,6 +131,7 @@ __all__ = [
     "check_whole",
     "compiled",
     "cut",
+    "deciding",
     "differentiable_step",
     "elastic",
     "elevated",
@@ -147,6 +149,7 @@ __all__ = [
     "node_widths",
     "normal_form",
     "number_of",
+    "piecewise_constant",
     "refuse_compiled",
     "refuse_free_ends",
     "refuse_in_subprocess",

@@ -35,6 +35,7 @@ from solvers.predictive.gpc_loop import GPCRun, gpc_loop
 from solvers.tabular.greedy import Greedy
 from solvers.tabular.grid_dp import GridDP
 from solvers.tabular.state_grid import Axis
+from solvers.via_points import via_point_guesses
 
 __all__ = [
     "GPC",
@@ -87,4 +88,5 @@ __all__ = [
     "repel",
     "second_order",
     "track",
+    "via_point_guesses",
 ]

@@ -44,6 +44,7 @@ def multistart(
     *,
     amplitude: float = 3.0,
     violation: float = 1e-4,
+    guesses: Sequence[Any] = (),
 ) -> tuple[LocalOptimum[Solution], ...]: ...
 
 
@@ -56,6 +57,7 @@ def multistart(
     *,
     amplitude: float = 3.0,
     violation: float = 1e-4,
+    guesses: Sequence[Any] = (),
 ) -> tuple[LocalOptimum[PhasesSolution], ...]: ...
 
 
@@ -67,6 +69,7 @@ def multistart(
     *,
     amplitude: float = 3.0,
     violation: float = 1e-4,
+    guesses: Sequence[Any] = (),
 ) -> tuple[LocalOptimum[Any], ...]:
     """Solve from several starts and return the distinct local optima, best first.
 
@@ -81,6 +84,8 @@ def multistart(
             bounded, at most half its range).
         violation: an answer that violates a constraint by more, by the referee's evaluation, does
             not count.
+        guesses: tried after the problem's own start, besides the random ones, such as
+            ``via_point_guesses``; of phases one tuple with a guess for each.
 
     Returns:
         optima with their true costs; empty if no start succeeded.
@@ -95,14 +100,14 @@ def multistart(
     check_whole(seed, "multistart: seed", least=0)
     check_positive(amplitude, "multistart: amplitude")
     check_not_negative(violation, "multistart: violation", finite=False)
+    check_instance(guesses, (tuple, list), "multistart: guesses")
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
     started = perf_counter()
     program = ocp.built_by(solver) if isinstance(ocp, Phases) else solver.build(ocp)
     build_time = perf_counter() - started
-    guesses = [None, *_guesses(ocp, starts - 1, seed, amplitude)]
     found: list[LocalOptimum[Any]] = []
-    for guess in guesses:
+    for guess in (None, *guesses, *_guesses(ocp, starts - 1, seed, amplitude)):
         solution: Any = program.run(guess=guess).with_(build_time=build_time)
         if not solution.status.is_success:
             continue

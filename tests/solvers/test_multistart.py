@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.cases import arm_scenario
 from models.textbook import double_integrator_energy, van_der_pol
-from ocp import OCP, Box, Constraint, Model, ProblemError, Status, evaluate
-from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart
+from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, Status, evaluate
+from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart, random_guesses
 from tests.solvers.problems import changed, ends, point
 from tests.tolerances import CERTIFIED
 
@@ -45,6 +45,15 @@ def test_more_starts_only_append() -> None:
     assert len(found) == 1
     assert found[0].found == 4
     assert multistart(van_der_pol(), Schuetz.sound(intervals=30), 1, 0)[0].found == 1
+
+
+def test_guesses_are_further_starts() -> None:
+    ocp, solver = arm_scenario("arm-003").ocp(), Schuetz.sound(intervals=20)
+    drawn = multistart(ocp, solver, 3, 1)
+    given = multistart(ocp, solver, 1, 1, guesses=random_guesses(ocp, 2, 1))
+    assert [(o.cost, o.found) for o in given] == [(o.cost, o.found) for o in drawn]
+    with pytest.raises(ProblemError, match="multistart: guesses is a Guess"):
+        multistart(ocp, solver, 1, 1, guesses=Guess(u=0.0))  # type: ignore[arg-type] on purpose
 
 
 def test_starts_lie_within_the_bounds() -> None:

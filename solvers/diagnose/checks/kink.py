@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ocp.internal import deciding
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.graph import appearing, depends, operations, shown
@@ -40,18 +41,26 @@ def _switches(subject: DiagnosedProblem) -> Iterator[Finding]:
         ("the dynamics", m.f),
     )
     for what, expression in terms:
+        worst: dict[int, Finding] = {}  # a decision has many values
         for node in operations(expression):
-            switch = _switch(node)
+            switch = _switch(subject, node)
             if switch is None or not depends(switch, ca.vertcat(m.x, m.u)):
                 continue
             order = _smoothness(subject, expression, switch)
             if order is not None and order < 2:
-                yield _finding(subject, what, node, switch, order)
+                found = _finding(subject, what, node, switch, order)
+                key = (node if deciding(node) is None else node.dep(0)).element_hash()
+                worst[key] = min(found, worst.get(key, found), key=lambda f: f.evidence)
+        yield from worst.values()
 
 
-def _switch(node: ca.SX) -> ca.SX | None:
+def _switch(subject: DiagnosedProblem, node: ca.SX) -> ca.SX | None:
+    """Return what is zero where a node switches; of a decision, half-way between two values."""
     if node.op() in _ONE:
         return node.dep(0)
+    if deciding(node) is not None:
+        values = (subject.around + subject.along).evaluate(subject.ocp, node)
+        return node - (values.min() + values.max()) / 2.0
     return node.dep(0) - node.dep(1) if node.op() in _TWO else None
 
 
@@ -108,7 +117,13 @@ def _finding(
     sort = {-1: "jumps", 0: "has a kink", 1: "has a jump in its second derivative"}[order]
     declared = subject.ocp.smoothness
     known = order >= 0 and declared <= order
-    said = f"{what[0].upper()}{what[1:]} {sort} where {shown(switch)} = 0, in {shown(node)}"
+    decision = deciding(node)
+    where = (
+        f"{shown(switch)} = 0, in {shown(node)}"
+        if decision is None
+        else f"'{decision.name()}' decides for something else"
+    )
+    said = f"{what[0].upper()}{what[1:]} {sort} where {where}"
     said += "" if known else f", but smoothness={declared} is declared"
     return Finding(
         Cause.KINK,
@@ -143,4 +158,6 @@ def _remedy(what: str, node: ca.SX, order: int) -> str:
             "controls p and m with control_bounds Box(0, ...), p - m in place of u, p + m in place "
             "of abs(u)."
         )
+    if deciding(node) is not None:
+        return "smoothness=0 says so; a distance from a ball has no kink where the ball is outside."
     return f"Write {smooth}, and reduce eps; smoothness=0 says that there is a kink."
