@@ -17,9 +17,9 @@ MAY_IMPORT = {
     "solvers": {"ocp"},
     "benchmarks": {"ocp", "models", "solvers"},
 }
-# Besides its root, what another package may import from: textbook problems, and what siblings
+# Besides its root, what another package may import from: robots, textbook problems, and what siblings
 # share but users need not know.
-ENTRANCES = {*LIBRARIES, "models.textbook", "ocp.internal", "solvers.internal"}
+ENTRANCES = {*LIBRARIES, "models.robot", "models.textbook", "ocp.internal", "solvers.internal"}
 
 
 def sources(*packages: str) -> list[Path]:
