@@ -1,6 +1,6 @@
 """Kinematics and dynamics of ten robots against Pinocchio, to 1e-12."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -120,8 +120,6 @@ def test_forward_dynamics_and_its_derivatives(name: str) -> None:
 
 
 def test_the_armature_is_that_of_pinocchio() -> None:
-    from dataclasses import replace
-
     robot, reference = robot_of("ur5e"), reference_of("ur5e")
     rotors = np.linspace(0.1, 0.6, 6)
     model = reference.model.copy()
