@@ -21,6 +21,7 @@ from models.robot.orientation import rotation_error
 from models.robot.panda import panda
 from models.robot.payload import Payload
 from models.robot.robot import Robot
+from models.robot.torque_ocp import TorqueAt, TorqueForm, torque_ocp
 from models.robot.urdf import read_urdf
 
 __all__ = [
@@ -40,8 +41,11 @@ __all__ = [
     "Pose",
     "Robot",
     "SphereShape",
+    "TorqueAt",
+    "TorqueForm",
     "panda",
     "read_urdf",
     "resolve_file",
     "rotation_error",
+    "torque_ocp",
 ]
