@@ -37,7 +37,7 @@ def newton_euler(
         a: their accelerations (n,); None: none.
         gravity: (3,) [m/s^2].
 
-    Source: [Luh, Walker, Paul 1980]; with pseudo-inertias [Khalil, Kleinfinger 1987].
+    Source: [Luh, Walker & Paul 1980]; with pseudo-inertias [Khalil & Kleinfinger 1987].
     """
     zero = ca.SX(np.zeros(3))
     base = (zero, ca.SX(-gravity), ca.SX(np.zeros((3, 3))))

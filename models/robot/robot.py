@@ -203,7 +203,7 @@ class Robot:
             \frac{\partial a}{\partial (q, v)} = -M^{-1} \frac{\partial \tau}{\partial (q, v)},
             \quad \frac{\partial a}{\partial \tau} = M^{-1}
 
-        Source: [Carpentier, Mansard 2018].
+        Source: [Carpentier & Mansard 2018].
         """
         self._check_masses()
         return tuple(self._call("derivatives", self._derivatives, q, v, effort))

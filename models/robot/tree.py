@@ -74,7 +74,7 @@ class Tree:
                 feel point masses on its axis: they may as well belong to its parent. So each body
                 hands on masses with the same m, m z and integral of z^2 dm (some negative), and
                 keeps zeros. Torques, and what follows from them, are the same for all q
-                [Gautier, Khalil 1990]; the forces that a bearing transmits are not.
+                [Gautier & Khalil 1990]; the forces that a bearing transmits are not.
         """
         found = [body.inertia.copy() for body in self.bodies]
         for i in reversed(range(len(found)) if regrouped else ()):
