@@ -21,6 +21,7 @@ from models.robot.orientation import rotation_error
 from models.robot.panda import panda
 from models.robot.payload import Payload
 from models.robot.robot import Robot
+from models.robot.tasks import InTime, OrientationTask, PoseTask, PositionTask, SpaceTask
 from models.robot.torque_ocp import TorqueAt, TorqueForm, torque_ocp
 from models.robot.urdf import read_urdf
 
@@ -30,6 +31,7 @@ __all__ = [
     "CylinderShape",
     "Description",
     "FramePose",
+    "InTime",
     "Inertia",
     "Joint",
     "JointLimits",
@@ -37,9 +39,13 @@ __all__ = [
     "Link",
     "MeshShape",
     "Mimic",
+    "OrientationTask",
     "Payload",
     "Pose",
+    "PoseTask",
+    "PositionTask",
     "Robot",
+    "SpaceTask",
     "SphereShape",
     "TorqueAt",
     "TorqueForm",

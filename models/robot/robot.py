@@ -10,11 +10,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from models._ldl import ldl_solve
 from models.robot.description import Description, JointLimits, Pose
 from models.robot.inverse_dynamics import newton_euler
 from models.robot.kinematics import FramePose, attached, body_poses, geometric_jacobian
 from models.robot.locked import locked
-from models.robot.mass_matrix import composite_mass_matrix, ldl_solve
+from models.robot.mass_matrix import composite_mass_matrix
 from models.robot.payload import Payload
 from models.robot.tree import Tree, tree_of
 from models.robot.urdf import read_urdf
