@@ -17,8 +17,8 @@ MAY_IMPORT = {
     "solvers": {"ocp"},
     "benchmarks": {"ocp", "models", "solvers"},
 }
-# Besides its root, what another package may import from: robots, textbook problems, and what siblings
-# share but users need not know.
+# Besides its root, what another package may import from: robots, textbook problems, and what
+# siblings share but users need not know.
 ENTRANCES = {*LIBRARIES, "models.robot", "models.textbook", "ocp.internal", "solvers.internal"}
 
 

@@ -15,7 +15,7 @@ from ocp import ProblemError
 from ocp.internal import check_instance, check_numbers
 
 # From time t [s], an SX, to a position (3,) [m] or a rotation (3, 3).
-InTime: TypeAlias = Callable[[ca.SX], ca.SX]
+InTime: TypeAlias = Callable[[ca.SX], Any]
 
 _RIGHT = 1e-9  # how far a rotation may be from an orthogonal matrix
 
