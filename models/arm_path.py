@@ -38,6 +38,19 @@ class ArmPath(Portable):
     parameters: tuple[Parameter | Signal, ...]
     name: str
 
+    def error(self, theta: ca.SX) -> ca.SX:
+        """Return r(θ) - r_d(t) (2,) [m]."""
+        return self.arm.end_effector(theta) - self.position
+
+    def jacobian(self, theta: ca.SX) -> ca.SX:
+        """Return J (2, n) [m], the derivative of the error in θ."""
+        return self.arm.jacobian(theta)
+
+    @property
+    def desired_rate(self) -> ca.SX:
+        """J dθ/dt (2,) [m/s] that keeps the error."""
+        return ca.densify(ca.jacobian(self.position, self.t))
+
     def check(self, theta0: np.ndarray, *, must_start_on_path: bool) -> None:
         """Refuse what no controller can do.
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from models._numbers import vector
 from models.arm import PlanarArm
+from models.robot.robot import Robot
 from ocp import ProblemError
 from ocp.internal import check_instance, check_not_negative, check_positive
 
@@ -24,7 +25,7 @@ class PostureCost(ABC):
     smoothness: ClassVar[Literal[0, 1, 2]] = 2
 
     @abstractmethod
-    def of(self, arm: PlanarArm, theta: ca.SX) -> ca.SX:
+    def of(self, arm: PlanarArm | Robot, theta: ca.SX) -> ca.SX:
         """Return the cost of a configuration (n,) [rad], a scalar."""
 
 
@@ -65,7 +66,7 @@ class JointLimitCost(PostureCost):
                 "above its lower one"
             )
 
-    def of(self, arm: PlanarArm, theta: ca.SX) -> ca.SX:
+    def of(self, arm: PlanarArm | Robot, theta: ca.SX) -> ca.SX:
         """Return the cost of a configuration (n,) [rad]."""
         lower, upper = np.asarray(self.lower), np.asarray(self.upper)
         if lower.size not in (1, arm.n):
@@ -101,8 +102,10 @@ class ManipulabilityCost(PostureCost):
         check_not_negative(self.gain, "manipulability cost: gain")
         check_positive(self.influence, "manipulability cost: influence")
 
-    def of(self, arm: PlanarArm, theta: ca.SX) -> ca.SX:
+    def of(self, arm: PlanarArm | Robot, theta: ca.SX) -> ca.SX:
         """Return the cost of a configuration (n,) [rad]."""
+        if isinstance(arm, Robot):
+            raise ProblemError("manipulability cost: it is that of a PlanarArm, not of a Robot")
         lack = ca.fmax(0.0, 1.0 - squared_manipulability(arm, theta) / self.influence**2)
         return self.gain / 3.0 * lack * lack**2
 

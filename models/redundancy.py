@@ -7,14 +7,18 @@ from typing import Literal
 import casadi as ca
 from numpy.typing import ArrayLike
 
+from models._ldl import ldl_solve
 from models._numbers import vector
 from models.arm import PlanarArm
 from models.arm_path import ArmPath
 from models.avoidance import Surroundings, check_avoidance, clearance_constraint
 from models.distance_cost import DistanceCost
 from models.obstacles import Obstacle
-from models.paths import Path, path_position, path_velocity
+from models.paths import Path, path_position
 from models.posture_cost import PostureCost
+from models.robot.robot import Robot
+from models.robot.tasks import SpaceTask
+from models.robot_path import RobotPath
 from ocp import OCP, Box, Constraint, Model, Parameter, ProblemError, Signal
 from ocp.internal import check_instance, check_not_negative, check_positive
 
@@ -23,8 +27,8 @@ Form = Literal["null-space", "velocity"]
 
 
 def redundancy_ocp(
-    arm: PlanarArm,
-    path: Path,
+    arm: PlanarArm | Robot,
+    path: Path | SpaceTask,
     *,
     theta0: ArrayLike,
     horizon: float,
@@ -71,8 +75,11 @@ def redundancy_ocp(
     Source: thesis (3.17) without damping, (3.18), (3.32), (3.37); [Nakamura 1991].
 
     Args:
-        arm: the arm, n >= 2 links.
-        path: r_d(t), any callable from the time symbol to (2,) [m].
+        arm: a planar arm, n >= 2 links, or a robot in space with more joints than its task has
+            rows, without obstacles.
+        path: r_d(t), any callable from the time symbol to (2,) [m]; of a robot its task:
+            ``PositionTask``, ``OrientationTask``, ``PoseTask``. Its error then stands for
+            r - r_d.
         theta0: start configuration (n,) [rad].
         horizon: duration [s].
         obstacles: any number, of any shape, at rest or moving; with none there is no
@@ -105,7 +112,7 @@ def redundancy_ocp(
             obstacle on the base, a start inside an obstacle.
     """
     t = ca.SX.sym("t") if t is None else t
-    check_instance(arm, PlanarArm, f"{name}: arm")
+    check_instance(arm, (PlanarArm, Robot), f"{name}: arm")
     start = vector(theta0, arm.n, f"{name}: theta0")
     duration = check_positive(horizon, f"{name}: horizon")
     k = check_not_negative(weight, f"{name}: weight")
@@ -113,26 +120,28 @@ def redundancy_ocp(
     _check_choices(name, cost, form)
     check_avoidance(name, obstacles, distance_cost, clearance)
     _check_kinds(name, posture_costs, joint_bounds, velocity_bounds)
-    target = path_position(path, t)
-    task = ArmPath(
-        arm=arm, position=target, t=t, horizon=duration, parameters=tuple(parameters), name=name
-    )
+    task = _task(arm, path, t, duration, parameters, name)
     task.check(start, must_start_on_path=gain == 0.0 and not free_start)
-    around = Surroundings(
-        arm=arm, obstacles=obstacles, t=t, horizon=duration, parameters=parameters, name=name
-    )
-    around.check(None if free_start else start)
+    if isinstance(arm, PlanarArm):
+        around = Surroundings(
+            arm=arm, obstacles=obstacles, t=t, horizon=duration, parameters=parameters, name=name
+        )
+        around.check(None if free_start else start)
+    elif obstacles:
+        raise ProblemError(f"{name}: obstacles of the plane are none of a Robot: leave them out")
 
     theta = ca.SX.sym("theta", arm.n)
-    error = arm.end_effector(theta) - target
-    rate = path_velocity(path, t) - gain * error
+    error = task.error(theta)
+    rate = task.desired_rate - gain * error
     limits = velocity_bounds or Box()
-    motion = _motion(arm.jacobian(theta), rate, cost, form, limits)
+    motion = _motion(task.jacobian(theta), rate, cost, form, limits)
     avoided = obstacles if distance_cost and k > 0.0 else ()
-    avoidance = k * distance_cost.of(arm, theta, avoided) if distance_cost else ca.SX(0)
+    avoidance = ca.SX(0)
+    if distance_cost and isinstance(arm, PlanarArm):
+        avoidance = k * distance_cost.of(arm, theta, avoided)
     posture = sum((term.of(arm, theta) for term in posture_costs), ca.SX(0))
     constraints = [*motion.constraints]
-    if clearance is not None:
+    if clearance is not None and isinstance(arm, PlanarArm):
         constraints += [clearance_constraint(arm, theta, obstacles, clearance)]
     if free_start:
         constraints += [Constraint("start on path", error, 0.0, 0.0, at="initial")]
@@ -185,22 +194,59 @@ def _velocity_form(jacobian: ca.SX, rate: ca.SX, limits: Box) -> _Motion:
 
 
 def _gram_solve(jacobian: ca.SX, vector: ca.SX) -> ca.SX:
-    """Return (JJ')^-1 vector (2,), the 2 x 2 inverse in closed form."""
+    """Return (JJ')^-1 vector (m,), two rows in closed form."""
+    if jacobian.shape[0] != 2:
+        return ldl_solve(ca.mtimes(jacobian, jacobian.T), vector)
     first, second = jacobian[0, :], jacobian[1, :]
     a, b, c = ca.sumsqr(first), ca.dot(first, second), ca.sumsqr(second)
     adjugate = ca.vertcat(c * vector[0] - b * vector[1], a * vector[1] - b * vector[0])
     return adjugate / (a * c - b**2)
 
 
-def _model(arm: PlanarArm, theta: ca.SX, motion: _Motion, t: ca.SX) -> Model:
+def _task(
+    arm: PlanarArm | Robot,
+    path: Path | SpaceTask,
+    t: ca.SX,
+    horizon: float,
+    parameters: Sequence[Parameter | Signal],
+    name: str,
+) -> ArmPath | RobotPath:
+    """Return what the arm follows, with its error, its Jacobian and its checks."""
+    if isinstance(arm, Robot):
+        if not isinstance(path, SpaceTask):
+            raise ProblemError(
+                f"{name}: path is a {type(path).__name__}; of a Robot the frame has to be named: "
+                "give a PositionTask, an OrientationTask or a PoseTask"
+            )
+        return RobotPath(
+            arm=arm, task=path, t=t, horizon=horizon, parameters=tuple(parameters), name=name
+        )
+    if isinstance(path, SpaceTask):
+        raise ProblemError(f"{name}: a {type(path).__name__} is for a Robot, the arm is planar")
+    return ArmPath(
+        arm=arm,
+        position=path_position(path, t),
+        t=t,
+        horizon=horizon,
+        parameters=tuple(parameters),
+        name=name,
+    )
+
+
+def _model(arm: PlanarArm | Robot, theta: ca.SX, motion: _Motion, t: ca.SX) -> Model:
+    in_space = isinstance(arm, Robot)
+    units = arm.units if in_space else ("rad",) * arm.n
     return Model(
-        name=f"planar arm, {arm.n} links",
+        name=arm.name if in_space else f"planar arm, {arm.n} links",
         x=theta,
         u=motion.control,
         f=motion.velocity,
         t=t,
-        x_units=("rad",) * arm.n,
-        u_units=("rad/s",) * arm.n,
+        x_units=units,
+        u_units=tuple(f"{unit}/s" for unit in units),
+        # In space much is zero but for rounding at the start, and no measure of sizes.
+        x_nominal=1.0 if in_space else None,
+        u_nominal=1.0 if in_space else None,
     )
 
 

@@ -18,9 +18,16 @@ MAY_IMPORT = {
     "solvers": {"ocp"},
     "benchmarks": {"ocp", "models", "solvers"},
 }
-# Besides its root, what another package may import from: bodies in space, textbook problems, and
-# what siblings share but users need not know.
-ENTRANCES = {*LIBRARIES, "models.shapes", "models.textbook", "ocp.internal", "solvers.internal"}
+# Besides its root, what another package may import from: robots, bodies in space, textbook problems,
+# and what siblings share but users need not know.
+ENTRANCES = {
+    *LIBRARIES,
+    "models.robot",
+    "models.shapes",
+    "models.textbook",
+    "ocp.internal",
+    "solvers.internal",
+}
 
 
 def sources(*packages: str) -> list[Path]:

@@ -32,13 +32,13 @@ class Columns:
             common: the others, (size,) each.
         """
         n, chunk = len(rows[0]), min(_CHUNK, len(rows[0]))
+        width = self.function.size1_out(0)
+        result, piece = np.empty((n, width)), np.empty((chunk, width))
+        if not n or not width:
+            return result
         mapped = self._mapped(chunk)
         inputs = [np.zeros((chunk, r.shape[1])) for r in rows]
         inputs += [np.ascontiguousarray(c, dtype=float).reshape(1, -1) for c in common]
-        width = self.function.size1_out(0)
-        result, piece = np.empty((n, width)), np.empty((chunk, width))
-        if not width:
-            return result
         buffer, evaluate = mapped.buffer()
         for i, array in enumerate(inputs):
             if array.size:

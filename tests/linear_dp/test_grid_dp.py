@@ -16,6 +16,7 @@ from ocp import (
     solve,
 )
 from solvers import Axis, GridDP, MultipleShooting
+from solvers.tabular.columns import Columns
 from solvers.tabular.state_grid import StateGrid
 from tests.linear_dp.problems import line, scalar, scalar_cost, tracking, unstable_mass, walk
 from tests.tolerances import ROUNDING
@@ -251,3 +252,10 @@ def test_201_by_201_points_81_controls_50_stages_take_seconds():
     solution = program.run()
     assert perf_counter() - started < 60.0
     assert solution.residual <= 0.01 * solution.cost
+
+
+def test_no_points_have_no_values():
+    x = ca.SX.sym("x", 2)
+    function = Columns(ca.Function("f", [x], [ca.vertcat(x, ca.sumsqr(x))]), 1)
+    assert function([np.empty((0, 2))], []).shape == (0, 3)
+    np.testing.assert_allclose(function([np.ones((1, 2))], []), [[1.0, 1.0, 2.0]])

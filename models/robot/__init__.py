@@ -1,0 +1,57 @@
+"""Real robots: any tree of rigid bodies from a URDF, its kinematics, dynamics and motions."""
+
+from models.robot.description import (
+    BoxShape,
+    Collision,
+    CylinderShape,
+    Description,
+    Inertia,
+    Joint,
+    JointLimits,
+    Limits,
+    Link,
+    MeshShape,
+    Mimic,
+    Pose,
+    SphereShape,
+)
+from models.robot.files import resolve_file
+from models.robot.kinematics import FramePose
+from models.robot.orientation import rotation_error
+from models.robot.panda import panda
+from models.robot.payload import Payload
+from models.robot.robot import Robot
+from models.robot.tasks import InTime, OrientationTask, PoseTask, PositionTask, SpaceTask
+from models.robot.torque_ocp import TorqueAt, TorqueForm, torque_ocp
+from models.robot.urdf import read_urdf
+
+__all__ = [
+    "BoxShape",
+    "Collision",
+    "CylinderShape",
+    "Description",
+    "FramePose",
+    "InTime",
+    "Inertia",
+    "Joint",
+    "JointLimits",
+    "Limits",
+    "Link",
+    "MeshShape",
+    "Mimic",
+    "OrientationTask",
+    "Payload",
+    "Pose",
+    "PoseTask",
+    "PositionTask",
+    "Robot",
+    "SpaceTask",
+    "SphereShape",
+    "TorqueAt",
+    "TorqueForm",
+    "panda",
+    "read_urdf",
+    "resolve_file",
+    "rotation_error",
+    "torque_ocp",
+]

@@ -1,0 +1,72 @@
+"""What a robot carries: a mass that may be known only when a problem is solved."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models.robot.description import Pose
+from models.robot.tree import homogeneous
+from ocp import ProblemError
+from ocp.internal import check_instance, check_not_negative, check_numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A rigid part fixed to a link.
+
+    Args:
+        frame: name of the link.
+        mass: [kg], a number of 0 or more, or an expression such as the symbol of a ``Parameter``.
+        center: its centre of mass (3,) [m] in the frame of the link, numbers or an expression.
+        tensor: its moments of inertia (3, 3) [kg m^2] about its centre of mass, in the axes of
+            the link; 0: a point mass.
+
+    Raises:
+        ProblemError: if a number is wrong, or the tensor is not symmetric.
+    """
+
+    frame: str
+    mass: float | ca.SX
+    center: ArrayLike | ca.SX = (0.0, 0.0, 0.0)
+    tensor: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_instance(self.frame, str, "payload: frame")
+        what = f"payload at '{self.frame}'"
+        if isinstance(self.mass, ca.SX):
+            if self.mass.numel() != 1:
+                raise ProblemError(f"{what}: its mass has {self.mass.numel()} entries, not one")
+        else:
+            check_not_negative(self.mass, f"{what}: mass")
+        if isinstance(self.center, ca.SX):
+            if self.center.numel() != 3:
+                raise ProblemError(f"{what}: its center has {self.center.numel()} entries, not 3")
+        else:
+            check_numbers(self.center, 3, f"{what}: center", repeat=False)
+        tensor = check_numbers(self.tensor, 9, f"{what}: tensor").reshape(3, 3)
+        if not np.allclose(tensor, tensor.T):
+            raise ProblemError(f"{what}: its tensor is not symmetric: {tensor.tolist()}")
+
+    @property
+    def symbols(self) -> ca.SX:
+        """What is not known yet (k,)."""
+        return ca.vertcat(ca.SX(0, 1), *ca.symvar(ca.veccat(ca.SX(self.mass), self._center)))
+
+    @property
+    def _center(self) -> ca.SX:
+        given = self.center
+        return ca.vec(given) if isinstance(given, ca.SX) else ca.SX(np.ravel(given))
+
+    def pseudo_inertia(self, pose: Pose) -> ca.SX:
+        """Return it (4, 4) in the frame of the body in which the link has this pose."""
+        c = self._center
+        h = self.mass * c
+        tensor = np.broadcast_to(np.asarray(self.tensor, dtype=float).reshape(-1), 9).reshape(3, 3)
+        about_center = ca.SX(np.trace(tensor) / 2.0 * np.eye(3) - tensor)
+        second = about_center + ca.mtimes(h, c.T)
+        own = ca.vertcat(ca.horzcat(second, h), ca.horzcat(h.T, ca.SX(self.mass)))
+        place = ca.SX(homogeneous(pose))
+        return ca.mtimes([place, own, place.T])

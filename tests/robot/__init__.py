@@ -1,0 +1,1 @@
+"""Real robots: descriptions, kinematics, dynamics and motions."""
