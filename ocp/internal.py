@@ -38,6 +38,7 @@ from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.normal_form.origin import Origin
 from ocp.phases.judged_phases import judged_phases
 from ocp.phases.link import LinkRows
 from ocp.problem.algebraic_controls import AlgebraicControls
@@ -64,6 +65,7 @@ from ocp.problem.refusal import (
 )
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
+from ocp.problem.soft import excess
 from ocp.problem.start_feasibility import start_violation
 from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
@@ -93,6 +95,7 @@ __all__ = [
     "MethodProgram",
     "MethodSolver",
     "NormalForm",
+    "Origin",
     "ParameterValues",
     "PiecewisePolynomial",
     "Portable",
@@ -129,6 +132,7 @@ __all__ = [
     "elastic",
     "elevated",
     "epigraph",
+    "excess",
     "hamiltonian",
     "interpolate",
     "interruptible",
