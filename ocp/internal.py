@@ -55,7 +55,7 @@ from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.grid import check_intervals, cut, number_of
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
-from ocp.problem.parameters import ParameterValues
+from ocp.problem.parameters import ParameterValues, Steps
 from ocp.problem.portable import Portable
 from ocp.problem.refusal import (
     refuse_compiled,
@@ -107,6 +107,7 @@ __all__ = [
     "Stage",
     "StageInputs",
     "StageTape",
+    "Steps",
     "Transcription",
     "Unbuildable",
     "Violation",

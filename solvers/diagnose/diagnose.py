@@ -54,7 +54,6 @@ _BEFORE: tuple[CheckFunction, ...] = (
 )
 # What a trial solve shows.
 _AFTER: tuple[CheckFunction, ...] = (
-    not_finite_after,
     free_time,
     unbounded,
     infeasible,
@@ -104,10 +103,7 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
         findings = [finding for check in _BEFORE for finding in check(subject)]
         findings = _tested(subject, findings)
         if not any(_explains(f) for f in findings):
-            for check in _AFTER:
-                findings += check(subject)
-                if any(f.cause is Cause.NOT_FINITE for f in findings):
-                    break  # what is no number has no least violation, and takes long
+            findings += [finding for check in _AFTER for finding in check(subject)]
             findings += _unsolved(subject, findings)
         findings = _tested(subject, findings)
     return Diagnosis.of(subject.ocp.name, [subject.terms.said(f) for f in findings])
@@ -150,9 +146,9 @@ def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Fi
     trial = subject.trial
     if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
         return
-    kinks = list(declared_kinks(subject))
-    yield from kinks
-    if kinks:
+    known = [*not_finite_after(subject), *declared_kinks(subject)]
+    yield from known
+    if known:
         return
     yield Finding(
         Cause.UNSOLVED,
