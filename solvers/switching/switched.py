@@ -97,8 +97,8 @@ def switched(
     Relaxed by the shares of the modes, which are all choices of levels (partial outer
     convexification [Sager 2009]), then rounded so that the integrals of the shares stay near
     (sum-up rounding [Sager, Bock & Diehl 2012]), then solved once more for the controls that have
-    no levels. With intervals half as wide the states come, to first order, half as near to the
-    relaxed ones, and the cost with them; what is left is between ``lower`` and ``upper``.
+    no levels. What is lost is bounded by a constant times the widest interval, so it vanishes with
+    narrow ones, though not in every step; how much it is here lies between ``lower`` and ``upper``.
 
     Args:
         ocp: the problem; constraints with such a control are on it alone (which levels go
