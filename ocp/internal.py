@@ -41,6 +41,7 @@ from ocp.minimum_principle.necessary_conditions import symbol_type
 from ocp.nlp.transcription import Transcription
 from ocp.nlp.violated_row import most_violated
 from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.normal_form.origin import Origin
 from ocp.phases.judged_phases import judged_phases
 from ocp.phases.link import LinkRows
 from ocp.problem.algebraic_controls import AlgebraicControls
@@ -57,7 +58,7 @@ from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.grid import check_intervals, cut, number_of
 from ocp.problem.node_fractions import node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
-from ocp.problem.parameters import ParameterValues
+from ocp.problem.parameters import ParameterValues, Steps
 from ocp.problem.portable import Portable
 from ocp.problem.refusal import (
     refuse_compiled,
@@ -67,6 +68,7 @@ from ocp.problem.refusal import (
 )
 from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
+from ocp.problem.soft import excess
 from ocp.problem.start_feasibility import start_violation
 from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
@@ -98,6 +100,7 @@ __all__ = [
     "MethodProgram",
     "MethodSolver",
     "NormalForm",
+    "Origin",
     "ParameterValues",
     "PiecewisePolynomial",
     "Portable",
@@ -110,6 +113,7 @@ __all__ = [
     "Stage",
     "StageInputs",
     "StageTape",
+    "Steps",
     "Transcription",
     "Unbuildable",
     "Violation",
@@ -136,6 +140,7 @@ __all__ = [
     "elastic",
     "elevated",
     "epigraph",
+    "excess",
     "external",
     "hamiltonian",
     "interpolate",

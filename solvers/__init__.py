@@ -32,6 +32,7 @@ from solvers.multistart import LocalOptimum, multistart, random_guesses
 from solvers.polish import polish
 from solvers.predictive.gpc import GPC, GPCLaw
 from solvers.predictive.gpc_loop import GPCRun, gpc_loop
+from solvers.switching.switched import SwitchedSolution, switched
 from solvers.tabular.greedy import Greedy
 from solvers.tabular.grid_dp import GridDP
 from solvers.tabular.state_grid import Axis
@@ -74,6 +75,7 @@ __all__ = [
     "Schuetz",
     "SecondOrder",
     "StagewiseNewton",
+    "SwitchedSolution",
     "Task",
     "certify",
     "descend",
@@ -87,6 +89,7 @@ __all__ = [
     "refine_mesh",
     "repel",
     "second_order",
+    "switched",
     "track",
     "via_point_guesses",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Box, FreeTime, Parameter, ProblemError, Solver, UnsupportedProblem
+from ocp import OCP, Box, FreeTime, Measurement, Parameter, ProblemError, Solver, UnsupportedProblem
 from ocp import without_kinks as written_without_kinks
 from ocp.internal import applied, scaled, walk
 from solvers import Collocation, MultipleShooting
@@ -34,7 +34,12 @@ def followed(ocp: OCP, finding: Finding) -> Followed:
             return Followed(replace(ocp, control_bounds=_bounded(ocp.control_bounds)))
         case Cause.UNBOUNDED:
             boxes = _bounded(ocp.control_bounds), _bounded(ocp.state_bounds)
-            return Followed(replace(ocp, control_bounds=boxes[0], state_bounds=boxes[1]))
+            unknowns = tuple(
+                replace(e, lower=np.maximum(e.lower, -_BOUND), upper=np.minimum(e.upper, _BOUND))
+                for e in ocp.unknowns
+            )
+            bounded = replace(ocp, unknowns=unknowns, control_bounds=boxes[0])
+            return Followed(replace(bounded, state_bounds=boxes[1]))
         case Cause.WRONG_SIGN:
             return Followed(_with_signs_changed(ocp, names))
         case Cause.NO_GOAL:
@@ -59,6 +64,13 @@ def followed(ocp: OCP, finding: Finding) -> Followed:
             return Followed(_kept_away(ocp, names))
         case Cause.DEGREES:
             return Followed(_in_radians(ocp, names))
+        case Cause.UNIDENTIFIABLE:
+            return Followed(_with_a_number(ocp, names))
+        case Cause.OUTLIER:
+            return Followed(_without_the_value(ocp, finding))
+        case Cause.CHEAP_SOFT:
+            hard = [replace(c, soft=None) if c.name in names else c for c in ocp.constraints]
+            return Followed(replace(ocp, constraints=tuple(hard)))
         case Cause.TIME_KIND:
             return Followed(_with_the_other_time(ocp))
         case Cause.COARSE_GRID:
@@ -157,6 +169,14 @@ def _kept_away(ocp: OCP, names: Sequence[str]) -> OCP:
     if "t" in names:
         return replace(ocp, horizon=(1.0 - _AWAY) * ocp.duration)
     named = np.isin(ocp.model.x_names, names)
+    if any(entry.name in names for entry in ocp.unknowns):
+        away = tuple(
+            replace(e, guess=np.maximum(e.guess, 2 * _AWAY), lower=np.maximum(e.lower, _AWAY))
+            if e.name in names
+            else e
+            for e in ocp.unknowns
+        )
+        return replace(ocp, unknowns=away)
     if not named.any():
         moved = [
             entry if isinstance(entry, Parameter) else replace(entry, samples=entry.value + 1.0)
@@ -167,6 +187,28 @@ def _kept_away(ocp: OCP, names: Sequence[str]) -> OCP:
     lower = np.where(named, np.maximum(box.lower, _AWAY), box.lower)
     start = np.where(named, np.maximum(ocp.start(), 2 * _AWAY), ocp.start())
     return replace(ocp, state_bounds=Box(lower, box.upper), x0=start)
+
+
+def _with_a_number(ocp: OCP, names: Sequence[str]) -> OCP:
+    """Fix the first named of the unknown constants at its guess."""
+    first = next(entry for entry in ocp.unknowns if entry.name in names)
+    return replace(
+        ocp,
+        unknowns=tuple(entry for entry in ocp.unknowns if entry is not first),
+        parameters=(*ocp.parameters, Parameter(first.name, first.symbol, first.value)),
+    )
+
+
+def _without_the_value(ocp: OCP, finding: Finding) -> OCP:
+    """Write NaN for the value that is named."""
+
+    def mended(measured: Measurement) -> Measurement:
+        values = np.asarray(measured.values)
+        wrong = values == finding.evidence
+        is_it = measured.name in finding.where
+        return replace(measured, values=np.where(wrong, np.nan, values)) if is_it else measured
+
+    return replace(ocp, data=tuple(mended(measured) for measured in ocp.data))
 
 
 def _in_radians(ocp: OCP, names: Sequence[str]) -> OCP:
@@ -190,11 +232,20 @@ def _in_radians(ocp: OCP, names: Sequence[str]) -> OCP:
     )
     angles = _symbols(ocp, names)
     degrees = ca.substitute(ca.SX(ocp.terminal_cost), angles, angles * (360.0 / _TURN))
+    unknowns = tuple(
+        replace(
+            entry, **{part: radians(getattr(entry, part)) for part in ("guess", "lower", "upper")}
+        )
+        if entry.name in names
+        else entry
+        for entry in ocp.unknowns
+    )
     return replace(
         ocp,
         x0=start,
         state_bounds=bounds,
         constraints=constraints,
+        unknowns=unknowns,
         terminal_cost=degrees,
         guess=None,
     )
@@ -209,10 +260,17 @@ def _with_the_other_time(ocp: OCP) -> OCP:
 
 
 def _without_the_first(ocp: OCP, names: Sequence[str]) -> OCP:
-    """Leave out the first constraint that is named, or the bounds of the first that is."""
+    """Leave out the first constraint that is named, or the bounds of the first that is.
+
+    Or a delay, peak or rate of that name.
+    """
     named = [c for c in ocp.constraints if c.name in names]
     if named:
         return replace(ocp, constraints=tuple(c for c in ocp.constraints if c is not named[0]))
+    peaks = tuple(peak for peak in ocp.peaks if peak.name not in names)
+    delays = tuple(delay for delay in ocp.delays if str(delay.control) not in names)
+    if len(peaks) < len(ocp.peaks) or len(delays) < len(ocp.delays):
+        return replace(ocp, peaks=peaks, delays=delays)
     free, m = (-np.inf, np.inf), ocp.model
     first = [name for name in names if name in (*m.x_names, *m.u_names)][:1]
     return replace(

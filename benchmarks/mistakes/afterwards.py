@@ -48,7 +48,7 @@ AFTERWARDS = (
         "voltage",
         lambda: of.servo(
             parameters=(),
-            data=(),
+            symbols=(),
             running_cost=lambda s: s.voltage**2,
             control_bounds=Box(-0.05, 0.05),
             constraints=of.ends({"spot": 1.0}),

@@ -15,13 +15,16 @@ Units = Mapping[str, str]
 def _problem(name: str, states: Units, controls: Units, sound: dict[str, Any], given: dict) -> OCP:
     """Build a problem from its sound parts, some replaced.
 
-    A part may be a function of the symbols: states, controls, t and the names in ``data``.
-    ``states`` and ``controls`` among the parts add symbols to those of the sound problem.
+    A part may be a function of the symbols: states, controls, t, the names in ``symbols`` and in
+    ``z``, which are algebraic variables, and of each state at the start, as ``start_<state>``.
+    ``states`` and ``more`` among the parts add symbols to its states and controls.
     """
     parts: dict[str, Any] = sound | given
     states, controls = {**states, **parts.pop("states", {})}, {**controls, **parts.pop("more", {})}
-    names = (*states, *controls, "t", *parts.pop("data", ()))
-    s = SimpleNamespace(**{n: ca.SX.sym(n) for n in names})
+    z = parts.pop("z", ())
+    names = (*states, *controls, "t", *z, *parts.pop("symbols", ()))
+    start = {f"start_{n}": ca.SX.sym(f"{n}(t0)") for n in states}
+    s = SimpleNamespace(**{n: ca.SX.sym(n) for n in names}, **start)
     parts = {key: part(s) if callable(part) else part for key, part in parts.items()}
     units = parts.pop("units", True)
     model = Model(
@@ -33,6 +36,10 @@ def _problem(name: str, states: Units, controls: Units, sound: dict[str, Any], g
         dt=parts.pop("dt", None),
         x_units=tuple(states.values()) if units else (),
         u_units=tuple(controls.values()) if units else (),
+        z=ca.vertcat(ca.SX(0, 1), *[getattr(s, n) for n in z]),
+        algebraic=ca.vertcat(ca.SX(0, 1), *parts.pop("algebraic", ())),
+        z_guess=parts.pop("z_guess", None),
+        start=ca.vertcat(*start.values()),
     )
     whole: dict[str, Any] = {"name": name, "model": model} | parts
     return OCP(**whole)
@@ -188,7 +195,7 @@ def servo(**given: Any) -> OCP:
     wave = np.sin(np.linspace(0.0, 2 * np.pi, 21))
     sound = {
         "f": lambda s: (s.drift, -s.drift + s.voltage),
-        "data": ("wanted",),
+        "symbols": ("wanted",),
         "x0": [0.0, 0.0],
         "horizon": 4.0,
         "running_cost": lambda s: (s.spot - s.wanted) ** 2 + 0.01 * s.voltage**2,

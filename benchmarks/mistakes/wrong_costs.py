@@ -238,7 +238,7 @@ COSTS = (
         Cause.UNUSED,
         "weight",
         lambda: of.cart(
-            data=("weight",), parameters=lambda s: (Parameter("weight", s.weight, 1.0),)
+            symbols=("weight",), parameters=lambda s: (Parameter("weight", s.weight, 1.0),)
         ),
     ),
     Mistake(

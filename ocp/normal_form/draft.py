@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
+from ocp.checks.expressions import element_names
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box, Constraint, unused
 from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
@@ -88,6 +90,7 @@ class Draft:
         controls: added ones.
         moved: controls of its own that are states now: where each one stands among all states.
         steps: added constants of the problem.
+        origins: what added names stand for.
     """
 
     ocp: OCP
@@ -100,6 +103,7 @@ class Draft:
     controls: list[AddedControls] = field(default_factory=list)
     moved: dict[int, int] = field(default_factory=dict)
     steps: list[Steps] = field(default_factory=list)
+    origins: dict[str, Origin] = field(default_factory=dict)
 
     @classmethod
     def of(cls, ocp: OCP) -> "Draft":
@@ -107,15 +111,33 @@ class Draft:
         costs = ca.SX(ocp.running_cost), ca.SX(ocp.terminal_cost)
         return cls(ocp, ocp.model.f, *costs, list(ocp.constraints), ocp.smoothness)
 
-    def unused(self, name: str) -> str:
-        """Return a name that no constraint has."""
-        return unused(name, {c.name for c in (*self.constraints, *self.ocp.invariants)})
+    def unused(self, name: str, origin: Origin) -> str:
+        """Return a name that no constraint has, for one that stands for ``origin``."""
+        name = unused(name, {c.name for c in (*self.constraints, *self.ocp.invariants)})
+        self.origins[name] = origin
+        return name
 
-    def add_states(self, added: AddedStates) -> slice:
-        """Add states, and return where they stand among all."""
+    def add_states(self, added: AddedStates, *origins: Origin) -> slice:
+        """Add states, and return where they stand among all.
+
+        Args:
+            added: the states.
+            origins: what each of them stands for, or one for all; none: for itself.
+        """
         first = self.ocp.model.nx + sum(s.symbol.numel() for s in self.states)
         self.states.append(added)
+        self._note(added.symbol, origins)
         return slice(first, first + added.symbol.numel())
+
+    def add_controls(self, added: AddedControls, *origins: Origin) -> None:
+        """Add controls, see ``add_states``."""
+        self.controls.append(added)
+        self._note(added.symbol, origins)
+
+    def _note(self, symbol: ca.SX, origins: tuple[Origin, ...]) -> None:
+        names = element_names(symbol) if origins else ()
+        each = origins * len(names) if len(origins) == 1 else origins
+        self.origins |= dict(zip(names, each, strict=True))
 
     @property
     def kept(self) -> list[int]:

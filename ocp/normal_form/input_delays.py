@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box
 from ocp.problem.scaled import sizes_of
 
@@ -27,6 +28,7 @@ def add_delays(draft: Draft) -> dict[str, slice]:
                 is_free=False,
                 box=Box.unbounded(delay.steps),
                 size=np.full(delay.steps, size),
-            )
+            ),
+            Origin(str(u)),
         )
     return found

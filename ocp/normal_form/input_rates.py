@@ -14,7 +14,9 @@ The costate of that state at the start is the sensitivity to the last input.
 import casadi as ca
 import numpy as np
 
+from ocp.checks.expressions import element_names
 from ocp.normal_form.draft import AddedControls, AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import sizes_of
@@ -33,9 +35,11 @@ def _move(draft: Draft) -> slice:
     ocp, rates = draft.ocp, draft.ocp.control_rates
     index, r = rates.index.tolist(), ca.vertcat(*[ca.SX.sym(name) for name in rates.names])
     size = sizes_of(ocp).u[index]
-    at = draft.add_states(_before(ocp, ocp.model.u[index], r, bounds=ocp.control_bounds[index]))
+    own = ocp.model.u[index]
+    before = _before(ocp, own, r, bounds=ocp.control_bounds[index])
+    at = draft.add_states(before, *_origins(own))
     draft.moved |= dict(zip(index, range(at.start, at.stop), strict=True))
-    draft.controls.append(AddedControls(r, rates.box, size / ocp.duration))
+    draft.add_controls(AddedControls(r, rates.box, size / ocp.duration))
     draft.running_cost += ca.dot(ca.DM(rates.weight), r**2)
     return at
 
@@ -48,9 +52,13 @@ def _add_changes(draft: Draft) -> slice:
     draft.running_cost += ca.dot(ca.DM(rates.weight), (u - last) ** 2)
     for i in np.flatnonzero(np.isfinite(rates.box.lower) | np.isfinite(rates.box.upper)).tolist():
         box, change = rates.box[[i]], u[i] - last[i]
-        name = draft.unused(f"bound of {rates.names[i]}")
+        name = draft.unused(f"bound of {rates.names[i]}", Origin(rates.names[i], "rate"))
         draft.constraints.append(Constraint(name, change, box.lower, box.upper, limits_input=True))
-    return draft.add_states(_before(ocp, last, u))
+    return draft.add_states(_before(ocp, last, u), *_origins(u))
+
+
+def _origins(u: ca.SX) -> list[Origin]:
+    return [Origin(name) for name in element_names(u)]
 
 
 def _before(ocp: OCP, symbol: ca.SX, after: ca.SX, *, bounds: Box | None = None) -> AddedStates:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.scaled import sizes_of
 
@@ -29,8 +30,10 @@ def add_integrals(draft: Draft) -> dict[str, slice]:
                 is_free=False,
                 box=Box.unbounded(c.size),
                 size=sizes_of(draft.ocp).rows[c.name],
-            )
+            ),
+            Origin(c.name, "integral"),
         )
+        draft.origins[c.name] = Origin(c.name, "integral")
         draft.constraints[i] = Constraint(
             c.name, total, c.lower, c.upper, at="terminal", nominal=c.nominal
         )

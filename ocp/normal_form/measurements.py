@@ -23,6 +23,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box
 from ocp.problem.functions import stacked
 from ocp.problem.ocp import OCP
@@ -74,7 +75,8 @@ def add_data(draft: Draft) -> DataTerms | None:
             is_free=False,
             box=Box.unbounded(1),
             size=np.array([typical]),
-        )
+        ),
+        Origin(ocp.data[0].name if len(ocp.data) == 1 else "data"),
     )
     draft.terminal_cost += at_end - e
     slope = 2 * ca.jacobian(h, model.x).T @ (w * h - y)

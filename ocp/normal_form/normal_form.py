@@ -1,5 +1,6 @@
 """The normal form of a problem: what methods get, and where in it the user's terms stand."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -12,6 +13,7 @@ from ocp.normal_form.input_delays import add_delays
 from ocp.normal_form.input_rates import add_rates
 from ocp.normal_form.integral_constraints import add_integrals
 from ocp.normal_form.measurements import DataTerms, add_data
+from ocp.normal_form.origin import Origin
 from ocp.normal_form.peaks import add_peaks
 from ocp.normal_form.soft_constraints import soften
 from ocp.normal_form.unknown_constants import add_start, add_unknowns
@@ -41,6 +43,7 @@ class NormalForm(Portable):
         histories: where the states stand that start at what was sent before, by run argument.
         peaks: where the largest values stand among its states, by name.
         waypoints: what constraints at instants have added.
+        origins: what the names that it adds stand for.
     """
 
     original: OCP
@@ -57,6 +60,7 @@ class NormalForm(Portable):
     peaks: dict[str, slice]
     data: DataTerms | None
     waypoints: Waypoints
+    origins: Mapping[str, Origin]
 
     def own_controls(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the controls of the original (..., nu) for states and controls of the problem."""
@@ -168,6 +172,7 @@ def normal_form(ocp: OCP) -> NormalForm | None:
         last_input=last_input,
         data=data,
         waypoints=waypoints,
+        origins=draft.origins,
         histories=histories,
         peaks=peaks,
     )

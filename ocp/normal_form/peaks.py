@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Constraint
 from ocp.problem.ocp import OCP
 from ocp.problem.peak import Peak
@@ -26,9 +27,10 @@ def add_peaks(draft: Draft) -> dict[str, slice]:
     for peak, first in zip(ocp.peaks, _first_values(ocp), strict=True):
         top, size = ca.SX.sym(f"peak of {peak.name}"), sizes[peak.name]
         value = AddedStates.constant(ocp, top, np.array([first]), size=np.array([size]))
-        found[peak.name] = draft.add_states(value)
+        found[peak.name] = draft.add_states(value, Origin(peak.name))
         draft.terminal_cost += peak.weight * top
-        below = Constraint(draft.unused(peak.name), peak.rows() - top, upper=0.0, nominal=size)
+        name = draft.unused(peak.name, Origin(peak.name, "peak"))
+        below = Constraint(name, peak.rows() - top, upper=0.0, nominal=size)
         draft.constraints.append(below)
     return found
 

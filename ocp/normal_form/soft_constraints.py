@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedControls, AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.scaled import sizes_of
 from ocp.problem.soft import excess, slackened
@@ -59,19 +60,20 @@ def _add_slack(draft: Draft, c: Constraint, sizes: np.ndarray) -> None:
     names = [f"excess of {c.name}" + (f"_{i}" if c.size > 1 else "") for i in range(c.size)]
     s = ca.vertcat(*[ca.SX.sym(name) for name in names])
     box = Box(np.zeros(c.size), np.full(c.size, np.inf))
-    price = c.soft.cost(s)
+    price, origin = c.soft.cost(s), Origin(c.name, f"soft {c.at}")
     if c.at == "path":
-        draft.controls.append(AddedControls(s, box, sizes))
+        draft.add_controls(AddedControls(s, box, sizes), origin)
         draft.running_cost += price
     else:
         zero = np.zeros(c.size)
-        draft.add_states(AddedStates.constant(draft.ocp, s, zero, size=sizes, box=box))
+        slack = AddedStates.constant(draft.ocp, s, zero, size=sizes, box=box)
+        draft.add_states(slack, origin)
         draft.terminal_cost += price
     for rows, expression, low, high in slackened(c.expression, c.box, s):
         if rows:
             draft.constraints.append(
                 Constraint(
-                    draft.unused(c.name),
+                    draft.unused(c.name, origin),
                     expression,
                     low,
                     high,

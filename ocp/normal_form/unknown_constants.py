@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Constraint
 from ocp.problem.scaled import sizes_of
 
@@ -20,7 +21,8 @@ def add_unknowns(draft: Draft) -> dict[str, slice]:
     ocp = draft.ocp
     return {
         entry.name: draft.add_states(
-            AddedStates.constant(ocp, entry.symbol, entry.value, size=entry.size, box=entry.box)
+            AddedStates.constant(ocp, entry.symbol, entry.value, size=entry.size, box=entry.box),
+            Origin(entry.name),
         )
         for entry in ocp.unknowns
     }
@@ -37,7 +39,9 @@ def add_start(draft: Draft, used: Sequence[int]) -> slice:
     if not index:
         return slice(m.nx, m.nx)
     symbol, zero = m.start[index], np.zeros(len(index))
-    name = draft.unused("start of the states")
+    names = [m.x_names[i] for i in index]
+    name = draft.unused("start of the states", Origin("start", "definition"))
     draft.constraints.append(Constraint(name, symbol - m.x[index], zero, zero, at="initial"))
     size = sizes_of(ocp).x[index]
-    return draft.add_states(AddedStates.constant(ocp, symbol, ocp.start()[index], size=size))
+    copy = AddedStates.constant(ocp, symbol, ocp.start()[index], size=size)
+    return draft.add_states(copy, *[Origin(name) for name in names])

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.normal_form.draft import AddedStates, Draft
+from ocp.normal_form.origin import Origin
 from ocp.problem.constraint import Box, Constraint
 from ocp.problem.portable import Portable
 from ocp.problem.scaled import sizes_of
@@ -76,9 +77,12 @@ def _add(draft: Draft, c: Constraint) -> tuple[slice, ca.SX]:
         values = [value + q[i] for i in range(count)]
     sizes = sizes_of(ocp).rows[c.name]
     draft.add_steps(f"instants of {c.name}", flags, edges, levels)
-    for name, kept in zip(names, values, strict=True):
-        own = Constraint(draft.unused(name), kept, c.lower, c.upper, at="terminal", nominal=sizes)
-        draft.constraints.append(own)
+    origins = [Origin(c.name, "waypoint", float(t)) for t in c.instants]
+    for name, kept, origin in zip(names, values, origins, strict=True):
+        own = draft.unused(name, origin)
+        draft.constraints.append(
+            Constraint(own, kept, c.lower, c.upper, at="terminal", nominal=sizes)
+        )
     total = c.size * count
     place = draft.add_states(
         AddedStates(
@@ -88,7 +92,8 @@ def _add(draft: Draft, c: Constraint) -> tuple[slice, ca.SX]:
             is_free=False,
             box=Box.unbounded(total),
             size=np.tile(sizes, count),
-        )
+        ),
+        *[origin for origin in origins for _ in range(c.size)],
     )
     return place, ca.SX.zeros(count) if ocp.model.is_discrete else flags
 

@@ -73,9 +73,10 @@ def epigraph(ocp: OCP, *, held: bool = False) -> "Epigraph | None":
     left: frozenset[int] = frozenset()
     if not _has_maximum(ocp):
         return None
+    fixed = _changing(ocp) if held else None
     while True:
-        rewritten = _Rewritten.of(ocp, left)
-        unfit = rewritten.unfit(ocp, held=held)
+        rewritten = _Rewritten.of(ocp, left, fixed)
+        unfit = rewritten.unfit(ocp)
         if not unfit:
             break
         left |= unfit
@@ -187,11 +188,17 @@ class _Rewritten:
     left: frozenset[int]
 
     @classmethod
-    def of(cls, ocp: OCP, left: frozenset[int]) -> "_Rewritten":
-        """Walk the operations of the running cost."""
+    def of(cls, ocp: OCP, left: frozenset[int], fixed: ca.SX | None = None) -> "_Rewritten":
+        """Walk the operations of the running cost.
+
+        Args:
+            ocp: the problem.
+            left: instructions that stay.
+            fixed: symbols of which no maximum that is replaced may contain any.
+        """
         m = ocp.model
         symbols, varying = ca.vertcat(m.x, m.u, m.t, ocp.p), ca.vertcat(m.x, m.u)
-        found = cls(ca.SX(0), [], [], [], [], left)
+        found, stay = cls(ca.SX(0), [], [], [], [], left), set(left)
 
         def node(
             k: int, operation: int, arguments: list[tuple[ca.SX, ca.SX]]
@@ -199,13 +206,16 @@ class _Rewritten:
             """With slacks, and as it was written."""
             values, written = ([pair[side] for pair in arguments] for side in (0, 1))
             original = applied(operation, written)
-            moves = ca.depends_on(ca.vertcat(*written), varying)
-            if operation in _MAXIMA and moves and k not in left:
-                return found._replace(operation, values, original, k), original
-            return applied(operation, values), original
+            # Only of a maximum it is asked what it depends on: a cost has thousands of operations.
+            if operation not in _MAXIMA or k in left or not ca.depends_on(original, varying):
+                return applied(operation, values), original
+            if fixed is not None and ca.depends_on(original, fixed):
+                stay.add(k)
+                return applied(operation, values), original
+            return found._replace(operation, values, original, k), original
 
         cost, _ = walk(ca.SX(ocp.running_cost), symbols, lambda leaf: (leaf, leaf), node)
-        return replace(found, cost=cost)
+        return replace(found, cost=cost, left=frozenset(stay))
 
     def _replace(self, operation: int, values: list[ca.SX], original: ca.SX, k: int) -> ca.SX:
         """Return a maximum as a new slack, a minimum as one with the other sign."""
@@ -232,9 +242,11 @@ class _Rewritten:
         slopes = ca.jacobian(rows, self.s, {"helper_options": {"ad_weight": 1.0}})
         return ca.densify(slopes) + ca.vertcat(ca.DM(1, len(self.slacks)), own)
 
-    def unfit(self, ocp: OCP, *, held: bool) -> frozenset[int]:
+    def unfit(self, ocp: OCP) -> frozenset[int]:
         """Return which maxima a slack does not replace, as instructions."""
-        m, weights, changing = ocp.model, self.weights, _changing(ocp)
+        if not self.slacks:
+            return frozenset()
+        m, weights = ocp.model, self.weights
         unfit = set[int]()
         for j, node in enumerate(self.nodes):
             weight = weights[:, j]
@@ -243,7 +255,7 @@ class _Rewritten:
             varies = varies or weight.is_zero()  # it stands in the argument of a call
             if not varies and not ca.depends_on(weight, ca.vertcat(m.t, ocp.p)):
                 varies = not (np.array(ca.evalf(weight)) >= 0.0).all()
-            if varies or (held and ca.depends_on(self.maxima[j], changing)):
+            if varies:
                 unfit.add(node)
         return frozenset(unfit)
 

@@ -26,31 +26,38 @@ class SizeEquation(NamedTuple):
 def solved(equations: Iterable[SizeEquation], size: int) -> np.ndarray:
     """Return the logarithms by least squares, 0 for what nothing is known of."""
     every = list(equations)
-    others = [e for e in every if not e.is_limit]
-    if len(others) == len(every) or not others:
-        return _least_squares(every, size)
-    matrix = np.array([_row(e, size) for e in others])
+    matrix, right = _system(every, size)
+    is_limit = np.array([e.is_limit for e in every], dtype=bool)
+    if is_limit.all() or not is_limit.any():
+        return _least_squares(matrix, right)
+    others = matrix[~is_limit]
+    logs = _least_squares(others, right[~is_limit])
+    far = [k for k in np.flatnonzero(is_limit) if _is_far(every[k], logs)]
+    if not far:
+        return _least_squares(matrix, right)
     # What the others determine is left where it is by the projection on their rows.
-    known = np.abs(np.diag(np.linalg.pinv(matrix, rcond=1e-9) @ matrix) - 1.0) < 1e-6
-    logs = _least_squares(others, size)
-
-    def is_near(e: SizeEquation) -> bool:
-        apart = e.value - logs[list(e.plus)].sum() + logs[list(e.minus)].sum()
-        return apart < _FAR or not known[[*e.plus, *e.minus]].all()
-
-    return _least_squares([e for e in every if not e.is_limit or is_near(e)], size)
+    known = np.abs(np.diag(np.linalg.pinv(others, rcond=1e-9) @ others) - 1.0) < 1e-6
+    left_out = [k for k in far if known[[*every[k].plus, *every[k].minus]].all()]
+    return _least_squares(np.delete(matrix, left_out, axis=0), np.delete(right, left_out))
 
 
-def _least_squares(equations: list[SizeEquation], size: int) -> np.ndarray:
-    if not equations:
-        return np.zeros(size)
-    matrix = np.array([_row(e, size) for e in equations])
-    right = np.array([e.weight * e.value for e in equations])
+def _is_far(limit: SizeEquation, logs: np.ndarray) -> bool:
+    apart = limit.value - logs[list(limit.plus)].sum() + logs[list(limit.minus)].sum()
+    return not apart < _FAR
+
+
+def _system(equations: list[SizeEquation], size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return matrix and right-hand side; an index may occur twice in an equation."""
+    matrix = np.zeros((len(equations), size))
+    for row, equation in zip(matrix, equations, strict=True):
+        for i in equation.plus:
+            row[i] += equation.weight
+        for i in equation.minus:
+            row[i] -= equation.weight
+    return matrix, np.array([e.weight * e.value for e in equations])
+
+
+def _least_squares(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    if not len(right):
+        return np.zeros(matrix.shape[1])
     return np.linalg.lstsq(matrix, right, rcond=1e-9)[0]
-
-
-def _row(equation: SizeEquation, size: int) -> np.ndarray:
-    row = np.zeros(size)
-    np.add.at(row, list(equation.plus), equation.weight)
-    np.subtract.at(row, list(equation.minus), equation.weight)
-    return row

@@ -1,6 +1,6 @@
 """What bounds and constraints demand, and the elastic problem of one instant."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import casadi as ca
@@ -42,8 +42,25 @@ def of_box(subject: DiagnosedProblem, kind: Literal["state", "control"]) -> Iter
             yield Demand((name,), label, unit, large, is_control), symbols[i], low, high
 
 
-def of_constraint(subject: DiagnosedProblem, c: Constraint) -> Iterator[Asked]:
-    """Yield every row of a constraint."""
+def of_start(subject: DiagnosedProblem, *, only_constants: bool = False) -> Iterator[Asked]:
+    """Yield the bounds of a free start, and of unknown constants: one demand each."""
+    ocp, box = subject.ocp, subject.ocp.start_bounds
+    free = np.flatnonzero(ocp.start_is_free).tolist()
+    for i in subject.constants if only_constants else free:
+        low, high = float(np.asarray(box.lower)[i]), float(np.asarray(box.upper)[i])
+        if np.isfinite([low, high]).any():
+            name = ocp.model.x_names[i]
+            label = f"the bounds [{low:g}, {high:g}] of {name}"
+            label += "" if i in subject.constants else " at the start"
+            demand = Demand((name,), label, subject.unit(name), size(low, high))
+            yield demand, ocp.model.x[i], low, high
+
+
+def of_constraint(
+    subject: DiagnosedProblem, c: Constraint, instant: float | None = None
+) -> Iterator[Asked]:
+    """Yield every row of a constraint; of one at instants as it was written: at which."""
+    label, when = subject.terms.label(c, instant), subject.terms.instant(c)
     for i, (row, low, high) in enumerate(
         zip(ca.vertsplit(c.expression), np.asarray(c.lower), np.asarray(c.upper), strict=True)
     ):
@@ -51,9 +68,8 @@ def of_constraint(subject: DiagnosedProblem, c: Constraint) -> Iterator[Asked]:
         which = f" (row {i}, {names[0] if len(names) == 1 else 'several'})" if c.size > 1 else ""
         unit = subject.unit(names[0]) if row.is_symbolic() else ""
         where = (c.name, *names) if row.is_symbolic() else (c.name,)
-        label = f"the {c.at} constraint '{c.name}'{which}"
         yield (
-            Demand(where, label, unit, size(float(low), float(high))),
+            Demand(where, label + which, unit, size(float(low), float(high)), instant=when),
             row,
             float(low),
             float(high),
@@ -61,14 +77,21 @@ def of_constraint(subject: DiagnosedProblem, c: Constraint) -> Iterator[Asked]:
 
 
 def at_instant(
-    subject: DiagnosedProblem, asked: list[Asked], t: float, fraction: float
+    subject: DiagnosedProblem,
+    asked: list[Asked],
+    t: float,
+    fraction: float,
+    given: Sequence[int] = (),
 ) -> ElasticProgram:
-    """Return the demands on (x, u) at one instant; x0 is not fixed."""
+    """Return the demands on (x, u) at one instant, of which only the ``given`` states are fixed."""
     ocp, m = subject.ocp, subject.ocp.model
     stacked = ca.vertcat(*[row for _, row, _, _ in asked])
     function = ca.Function("rows", [ca.vertcat(m.x, m.u), m.t, ocp.p], [ca.densify(stacked)])
     demands = tuple(dict.fromkeys(demand for demand, *_ in asked))
-    w, free = ca.MX.sym("w", m.nx + m.nu), np.full(m.nx + m.nu, np.inf)
+    w, box = ca.MX.sym("w", m.nx + m.nu), np.full((2, m.nx + m.nu), [[-np.inf], [np.inf]])
+    copied = [copy for copy, own in subject.copies.items() if not ocp.start_is_free[own]]
+    fixed = [*given, *copied]
+    box[:, fixed] = subject.data.x0[fixed]
     return ElasticProgram(
         w=w,
         p=ca.MX(0, 1),
@@ -78,5 +101,5 @@ def at_instant(
         upper=np.array([a[3] for a in asked]),
         owner=np.array([demands.index(demand) for demand, *_ in asked]),
         demands=demands,
-        box=(-free, free),
+        box=(box[0], box[1]),
     )

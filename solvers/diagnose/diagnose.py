@@ -9,17 +9,20 @@ from ocp import OCP, ProblemError, Solution
 from ocp.internal import RunData, normal_form
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.checks.activity import activity
+from solvers.diagnose.checks.cheap_soft import cheap_soft
 from solvers.diagnose.checks.curvature import curvature
 from solvers.diagnose.checks.degrees import degrees
 from solvers.diagnose.checks.duplicate import duplicate
 from solvers.diagnose.checks.free_time import free_time
 from solvers.diagnose.checks.grid import grid, referee
 from solvers.diagnose.checks.guess import guess
+from solvers.diagnose.checks.identifiable import identifiable
 from solvers.diagnose.checks.infeasible import infeasible
 from solvers.diagnose.checks.influence import influence
 from solvers.diagnose.checks.instants import instants
 from solvers.diagnose.checks.kink import declared_kinks, kink
-from solvers.diagnose.checks.not_finite import not_finite
+from solvers.diagnose.checks.not_finite import not_finite, not_finite_after
+from solvers.diagnose.checks.outlier import outlier
 from solvers.diagnose.checks.scaling import scaling
 from solvers.diagnose.checks.time_kind import time_kind
 from solvers.diagnose.checks.unbounded import unbounded
@@ -46,9 +49,19 @@ _BEFORE: tuple[CheckFunction, ...] = (
     duplicate,
     kink,
     guess,
+    outlier,
+    identifiable,
 )
 # What a trial solve shows.
-_AFTER: tuple[CheckFunction, ...] = (free_time, unbounded, infeasible, referee, scaling, activity)
+_AFTER: tuple[CheckFunction, ...] = (
+    free_time,
+    unbounded,
+    infeasible,
+    referee,
+    scaling,
+    cheap_soft,
+    activity,
+)
 
 # What cannot be where there is a trajectory.
 _DISPROVED = (
@@ -93,7 +106,7 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
             findings += [finding for check in _AFTER for finding in check(subject)]
             findings += _unsolved(subject, findings)
         findings = _tested(subject, findings)
-    return Diagnosis.of(subject.ocp.name, findings)
+    return Diagnosis.of(subject.ocp.name, [subject.terms.said(f) for f in findings])
 
 
 def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProblem:
@@ -102,8 +115,9 @@ def _subject(asked: OCP | Solution, solver: MultipleShooting) -> DiagnosedProble
         normal = asked.normal if isinstance(asked, Solution) else None
         asked = normal or form.problem
     if isinstance(asked, Solution):
-        return DiagnosedProblem(asked.problem, asked.data, solver, asked)
-    return DiagnosedProblem(asked, RunData(asked.start(), 0.0, asked.parameter_values()), solver)
+        return DiagnosedProblem(asked.problem, asked.data, solver, asked, form)
+    data = RunData(asked.start(), 0.0, asked.parameter_values())
+    return DiagnosedProblem(asked, data, solver, form=form)
 
 
 def _tested(subject: DiagnosedProblem, findings: list[Finding]) -> list[Finding]:
@@ -132,9 +146,9 @@ def _unsolved(subject: DiagnosedProblem, findings: list[Finding]) -> Iterator[Fi
     trial = subject.trial
     if trial.status.is_success or any(f.severity is not Severity.ADVICE for f in findings):
         return
-    kinks = list(declared_kinks(subject))
-    yield from kinks
-    if kinks:
+    known = [*not_finite_after(subject), *declared_kinks(subject)]
+    yield from known
+    if known:
         return
     yield Finding(
         Cause.UNSOLVED,

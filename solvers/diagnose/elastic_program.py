@@ -32,6 +32,7 @@ class Demand:
         unit: of its violation.
         size: the violation that counts as 1.
         is_control: whether it is a bound of a control.
+        instant: when it holds [s], where it has an instant of its own.
     """
 
     where: tuple[str, ...]
@@ -39,6 +40,7 @@ class Demand:
     unit: str = ""
     size: float = 1.0
     is_control: bool = False
+    instant: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

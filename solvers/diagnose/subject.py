@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Program, Solution
-from ocp.internal import RunData, number_of, scaled
+from ocp.internal import NormalForm, RunData, number_of, scaled
+from solvers.diagnose.terms import Terms
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
 # Random points around the guess, for what must hold everywhere.
@@ -54,12 +55,48 @@ class DiagnosedProblem:
         data: start, initial time and parameters of the run.
         solver: the direct method that tries it.
         given: the solution that was asked about, if any.
+        form: where the problem is a normal form, all of it.
     """
 
     ocp: OCP
     data: RunData
     solver: MultipleShooting
     given: Solution | None = None
+    form: NormalForm | None = None
+
+    @cached_property
+    def terms(self) -> Terms:
+        """The words of the user."""
+        return Terms.of(self.ocp, self.form)
+
+    @property
+    def written(self) -> OCP:
+        """The problem as it was written, with its algebraic variables solved for."""
+        return self.terms.written
+
+    @cached_property
+    def constants(self) -> list[int]:
+        """Which states are unknown constants."""
+        places = self.form.unknowns.values() if self.form else ()
+        return [i for at in places for i in range(at.start, at.stop)]
+
+    @cached_property
+    def copies(self) -> dict[int, int]:
+        """Which states are copies of others at the start: copy and original."""
+        if self.form is None:
+            return {}
+        own, start = self.form.from_start, self.form.start
+        return dict(zip(range(start.start, start.stop), own, strict=True))
+
+    @cached_property
+    def start_directions(self) -> np.ndarray:
+        """In which directions the start may move, (nx, k): a copy moves with its original."""
+        free, copies = self.ocp.start_is_free, self.copies
+        own = [i for i in np.flatnonzero(free).tolist() if i not in copies]
+        moves = np.eye(self.ocp.model.nx)
+        for copy, original in copies.items():
+            moves[copy, original] = 1.0
+        return moves[:, own]
 
     @cached_property
     def program(self) -> MultipleShootingProgram:
@@ -146,6 +183,14 @@ class DiagnosedProblem:
         x = ocp.state_bounds.clip(scattered(near.x))
         u = ocp.control_bounds.clip(scattered(near.u))
         return SamplePoints(x, u, near.t[rows], near.p[rows])
+
+    def excited(self, seed: int) -> np.ndarray:
+        """Return random controls within their bounds, or within 1 where they have none, (N, nu)."""
+        bounds, rng = self.ocp.control_bounds, np.random.default_rng(seed)
+        low = np.where(np.isfinite(bounds.lower), bounds.lower, -1.0)
+        high = np.where(np.isfinite(bounds.upper), bounds.upper, 1.0)
+        shape = (self.program.transcription.n, self.ocp.model.nu)
+        return low + (high - low) * rng.uniform(size=shape)
 
     def unit(self, name: str) -> str:
         """Return the unit of a state or control; empty where none was declared."""

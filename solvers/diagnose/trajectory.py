@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from solvers.diagnose.demands import of_box, of_constraint
+from solvers.diagnose.demands import of_box, of_constraint, of_start
 from solvers.diagnose.elastic_program import Demand, ElasticProgram
 from solvers.diagnose.subject import DiagnosedProblem
 
@@ -29,13 +29,13 @@ def along(subject: DiagnosedProblem) -> tuple[ElasticProgram, np.ndarray]:
     """Return the demands along the whole trajectory, and the node of every row."""
     tr = subject.program.transcription
     program, bounds = tr.program, tr.bounds(subject.data)
-    boxed = list(_boxed(subject))
-    rows = [*_constrained(subject), *boxed]
+    boxed, constrained = list(_boxed(subject)), list(_constrained(subject))
+    rows = [*constrained, *boxed]
     box = (bounds["lbx"].copy(), bounds["ubx"].copy())
     relaxed = [row.index - len(tr.rows) for row in boxed]
     box[0][relaxed], box[1][relaxed] = -np.inf, np.inf
     demands = tuple(dict.fromkeys(row.demand for row in rows))
-    hard = [i for i, row in enumerate(tr.rows) if row.place in _HARD]
+    hard = sorted(set(range(len(tr.rows))) - {row.index for row in constrained})
     elastic = ElasticProgram(
         w=program["x"],
         p=program["p"],
@@ -61,13 +61,19 @@ def _boxed(subject: DiagnosedProblem) -> Iterator[_Row]:
         given = column < m.nx and not ocp.start_is_free[column]
         for j in range(column + width * given, tr.size, width):
             yield _Row(demand, count + j, j // width, lower, upper)
+    for demand, symbol, lower, upper in of_start(subject):
+        yield _Row(demand, count + columns[symbol.element_hash()], 0, lower, upper)
 
 
 def _constrained(subject: DiagnosedProblem) -> Iterator[_Row]:
-    """Yield the rows of the constraints, in the order of the program."""
+    """Yield the rows of the constraints that somebody wrote, in the order of the program."""
     ocp, tr = subject.ocp, subject.program.transcription
     given = {
-        place: [demand for c in ocp.at(place) for demand, *_ in of_constraint(subject, c)]
+        place: [
+            demand if subject.terms.is_written(c) else None
+            for c in ocp.at(place)
+            for demand, *_ in of_constraint(subject, c)
+        ]
         for place in ("path", "initial", "terminal")
     }
     on_control = ocp.rows.path.on_control
@@ -78,4 +84,5 @@ def _constrained(subject: DiagnosedProblem) -> Iterator[_Row]:
             which = counted.get((row.place, row.node), 0)
             counted[row.place, row.node] = which + 1
             here = late if row.place == "path" and row.node == tr.n else given[row.place]
-            yield _Row(here[which], i, row.node, row.lower, row.upper)
+            if (demand := here[which]) is not None:
+                yield _Row(demand, i, row.node, row.lower, row.upper)

@@ -11,6 +11,7 @@ from solvers import Collocation, MultipleShooting, diagnose, refine_mesh
 
 @pytest.mark.over_library
 @pytest.mark.slow
+@pytest.mark.over_library
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda m: m.name)
 def test_advice_leads_on(mistake: Mistake):
     asked = mistake.build()

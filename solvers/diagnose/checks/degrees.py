@@ -51,10 +51,10 @@ def _angles(subject: DiagnosedProblem) -> Iterator[int]:
     m = subject.ocp.model
     if m.x_units:
         yield from (i for i, unit in enumerate(m.x_units) if unit == "rad")
-        return
+    asked = subject.constants if m.x_units else range(m.nx)
     turned = [n.dep(0) for n in operations(m.f) if n.op() in (ca.OP_SIN, ca.OP_COS)]
     slopes = ca.jacobian(ca.vertcat(ca.SX(0, 1), *turned), m.x)
-    yield from (i for i in range(m.nx) if slopes[:, i].nnz() and slopes[:, i].is_constant())
+    yield from (i for i in asked if slopes[:, i].nnz() and slopes[:, i].is_constant())
 
 
 def _numbers(subject: DiagnosedProblem, i: int) -> Iterator[tuple[str, float]]:
@@ -62,7 +62,8 @@ def _numbers(subject: DiagnosedProblem, i: int) -> Iterator[tuple[str, float]]:
     symbol = ocp.model.x[i]
     for side in ("lower", "upper"):
         yield f"{side} bound", float(np.asarray(getattr(ocp.state_bounds, side))[i])
-    for c in ocp.constraints:
+        yield f"{side} bound", float(np.asarray(getattr(ocp.start_bounds, side))[i])
+    for c in subject.written.constraints:
         for row, low, high in zip(
             ca.vertsplit(c.expression), np.asarray(c.lower), np.asarray(c.upper), strict=True
         ):

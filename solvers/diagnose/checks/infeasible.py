@@ -61,10 +61,13 @@ def _time_may_help(
 ) -> bool:
     """Where an end takes part: what stands in its way may be a control, or a speed limit.
 
-    A signal is given over the horizon as it is.
+    A signal is given over the horizon as it is, and so are data.
     """
+    written = subject.written
+    if written.moving or written.data:
+        return False
     ends = {c.name for c in subject.ocp.at("terminal")}
-    return not subject.ocp.moving and any(ends & set(elastic.demands[i].where) for i in members)
+    return any(ends & set(elastic.demands[i].where) for i in members)
 
 
 def _shortest(subject: DiagnosedProblem) -> float | None:
@@ -113,6 +116,8 @@ def _finding(
     mine = elastic.owner == worst
     row = int(np.flatnonzero(mine)[answer.weight[mine].argmax()])
     t = float(subject.data.t0 + nodes[row] / nodes.max(initial=1) * duration)
+    if demand.instant is not None:
+        t = float(subject.data.t0 + demand.instant)
     names = tuple(dict.fromkeys(name for d in demands for name in d.where))
     labels = [d.label for d in demands]
     said = f"{' and '.join([', '.join(labels[:-1]), labels[-1]])} cannot hold together"
@@ -126,7 +131,8 @@ def _finding(
     ]
     parts += _alone(elastic, answer, members, p)
     if shortest is not None:
-        parts.append(f"With a horizon of {shortest:.3g} s it becomes possible.")
+        later = ", and instants as much later," if subject.written.at("instants") else ""
+        parts.append(f"With a horizon of {shortest:.3g} s{later} it becomes possible.")
     return Finding(
         Cause.CONFLICT if shortest is None else Cause.OUT_OF_REACH,
         Severity.ERROR,

@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 
-import casadi as ca
 import numpy as np
 
 from solvers.diagnose.cause import Cause
-from solvers.diagnose.demands import Asked, at_instant, of_box, of_constraint
+from solvers.diagnose.demands import Asked, at_instant, of_box, of_constraint, of_start
 from solvers.diagnose.elastic_program import ElasticProgram, ElasticSolution
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.graph import depends
@@ -17,9 +16,10 @@ _STARTS = 8
 
 
 def instants(subject: DiagnosedProblem) -> Iterator[Finding]:
-    """Look for contradictions on the way and at both ends, then at the start as it is given."""
+    """Look for contradictions on the way, at instants and both ends, then at the given start."""
     found = [*_anywhere(subject, "on the way"), *_anywhere(subject, "at the end")]
-    if subject.ocp.has_free_start:
+    found += _waypoints(subject)
+    if subject.written.has_free_start:
         found += _anywhere(subject, "at the start")
     elif not found:
         found += _start(subject)
@@ -32,7 +32,14 @@ def _anywhere(subject: DiagnosedProblem, when: str) -> Iterator[Finding]:
         return
     row = {"at the start": 0, "on the way": len(subject.along.t) // 2, "at the end": -1}[when]
     t, fraction = float(subject.along.t[row]), {0: 0.0, -1: 1.0}.get(row, 0.5)
-    elastic = at_instant(subject, asked, t, fraction)
+    given = _given(subject) if when == "at the start" else []
+    elastic = at_instant(subject, asked, t, fraction, given)
+    yield from _contradictions(subject, elastic, when, t)
+
+
+def _contradictions(
+    subject: DiagnosedProblem, elastic: ElasticProgram, when: str, t: float
+) -> Iterator[Finding]:
     answer = _least(subject, elastic)
     if answer is None:
         return
@@ -41,15 +48,44 @@ def _anywhere(subject: DiagnosedProblem, when: str) -> Iterator[Finding]:
         yield _contradiction(elastic, answer, conflict, when, t)
 
 
+def _waypoints(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Look at each instant at which a constraint holds: with the bounds, and the others there."""
+    ocp, written = subject.ocp, subject.written
+    at = written.at("instants")
+    always = [*of_box(subject, "state"), *of_start(subject, only_constants=True)]
+    for c in ocp.at("path"):
+        always += [a for a in of_constraint(subject, c) if not depends(a[1], ocp.model.u)]
+    for instant in np.unique(np.concatenate([np.zeros(0), *[c.instants for c in at]])):
+        here = [c for c in at if (c.instants == instant).any()]
+        own = [a for c in here for a in of_constraint(subject, c, float(instant))]
+        t, fraction = subject.data.t0 + float(instant), float(instant / ocp.duration)
+        elastic = at_instant(subject, [*own, *always], t, fraction)
+        found = list(_contradictions(subject, elastic, f"at {instant:g} s", t))
+        yield from found
+        if found:
+            return
+
+
+def _given(subject: DiagnosedProblem) -> list[int]:
+    """Return the states whose start is given."""
+    return np.flatnonzero(~subject.ocp.start_is_free).tolist()
+
+
 def _asked(subject: DiagnosedProblem, when: str) -> list[Asked]:
     """Return what holds at an instant; what the end asks of controls is left to the way."""
     ocp = subject.ocp
     path = [a for c in ocp.at("path") for a in of_constraint(subject, c)]
-    states = list(of_box(subject, "state"))
+    states = [*of_box(subject, "state"), *of_start(subject, only_constants=True)]
     if when == "on the way":
         return [*of_box(subject, "control"), *states, *path] if path else []
     here = ocp.at("terminal" if when == "at the end" else "initial")
-    own = [a for c in here for a in of_constraint(subject, c)]
+    written = [c for c in here if subject.terms.is_written(c)]
+    own = [a for c in written for a in of_constraint(subject, c)]
+    if when == "at the start":
+        own += of_start(subject)
+        states = [a for a in states if not depends(a[1], ocp.model.x[_given(subject)])]
+        path = [*path, *of_box(subject, "control")] if path else []
+        return [*own, *states, *path] if own or path else []
     if not own:
         return []
     return [*own, *states, *(a for a in path if not depends(a[1], ocp.model.u))]
@@ -116,14 +152,14 @@ def _contradiction(
 
 def _start(subject: DiagnosedProblem) -> Iterator[Finding]:
     """Is there a control with which the given start meets the path constraints?"""
-    ocp, m = subject.ocp, subject.ocp.model
+    ocp = subject.ocp
     path = [a for c in ocp.at("path") for a in of_constraint(subject, c)]
     if not path:
         return
-    asked = [*of_box(subject, "control"), *path]
+    constants = of_start(subject, only_constants=True)
+    fixed = [*of_box(subject, "control"), *path, *constants]
     x0, t0 = subject.data.x0, subject.data.t0
-    fixed = [(d, ca.substitute(row, m.x, ca.DM(x0)), low, high) for d, row, low, high in asked]
-    elastic = at_instant(subject, fixed, t0, 0.0)
+    elastic = at_instant(subject, fixed, t0, 0.0, _given(subject))
     # From several controls: at one of them the gradient of a constraint may vanish.
     controls = np.vstack([subject.along.u[:1], subject.around.u])[:_STARTS]
     answer = _least_from(elastic, np.hstack([np.tile(x0, (len(controls), 1)), controls]))

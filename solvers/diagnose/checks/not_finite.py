@@ -34,6 +34,36 @@ def not_finite(subject: DiagnosedProblem) -> Iterator[Finding]:
             yield _finding(subject, what, expression, _only(points, int(bad[0])))
 
 
+def not_finite_after(subject: DiagnosedProblem) -> Iterator[Finding]:
+    """Do the same where a failed trial has ended: a search may leave where terms are defined."""
+    if subject.trial.status.is_success:
+        return
+    last = len(subject.tried.t) - 1
+    for points in (subject.tried, _ahead(subject)):
+        for what, expression, at_end in _terms(subject):
+            here = _only(points, last) if at_end else points
+            bad = _bad(subject, expression, here)
+            if bad.size:
+                yield _finding(subject, what, expression, _only(here, int(bad[0])))
+                return
+
+
+def _ahead(subject: DiagnosedProblem) -> SamplePoints:
+    """Return where the first controls lead, if the states go on straight from the last node.
+
+    A roll-out is no number from where it leaves what a table or an equation is defined for.
+    """
+    near, grid = subject.along, subject.program.grid
+    data, ocp = subject.data, subject.ocp
+    after = np.array(grid.rollout(data.x0, near.u[:-1].T, *grid.schedule(data, ocp.duration))[0])
+    x = np.vstack([data.x0, after.T])
+    count = int(np.isfinite(x).all(axis=1).cumprod().sum())
+    k = min(count, len(x) - 1)
+    step = (x[k - 1] - x[k - 2]) if k > 1 else np.zeros(len(data.x0))
+    x[count:] = x[k - 1] + step
+    return SamplePoints(x, near.u, near.t, near.p)
+
+
 def _terms(subject: DiagnosedProblem) -> Iterator[tuple[str, ca.SX, bool]]:
     ocp = subject.ocp
     for name, row in zip(ocp.model.x_names, ca.vertsplit(ocp.model.f), strict=True):
@@ -41,7 +71,7 @@ def _terms(subject: DiagnosedProblem) -> Iterator[tuple[str, ca.SX, bool]]:
     yield "the running cost", ca.SX(ocp.running_cost), False
     yield "the terminal cost", ca.SX(ocp.terminal_cost), True
     for c in ocp.constraints:
-        yield f"constraint '{c.name}'", c.expression, c.at == "terminal"
+        yield subject.terms.label(c), c.expression, c.at == "terminal"
 
 
 def _bad(subject: DiagnosedProblem, expression: ca.SX, points: SamplePoints) -> np.ndarray:

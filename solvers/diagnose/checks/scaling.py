@@ -9,6 +9,7 @@ import numpy as np
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.conditioning import Conditioning, conditioning
 from solvers.diagnose.finding import Finding, Severity
+from solvers.diagnose.graph import depends
 from solvers.diagnose.subject import DiagnosedProblem
 
 # Beyond these ratios an interior-point method loses its digits.
@@ -106,12 +107,28 @@ def _weights(
         return
     large, small = there[values[there].argmax()], there[values[there].argmin()]
     if values[large] > _WEIGHTS * values[small]:
+        priced = _priced(subject, int(large))
+        by = f", by the price of {', '.join(repr(name) for name in priced)}" if priced else ""
+        advice = "make it hard" if priced else "make the dear one a constraint"
         yield Finding(
             Cause.BAD_SCALING,
             Severity.WARNING,
-            (names[large], names[small]),
+            (*priced, names[large], names[small]),
             f"A typical {names[large]} costs {values[large] / values[small]:.1e} times what a "
-            f"typical {names[small]} costs: the smaller is lost in rounding. Bring the weights "
-            "closer, or make the dear one a constraint.",
+            f"typical {names[small]} costs{by}: the smaller is lost in rounding. Bring the weights "
+            f"closer, or {advice}.",
             float(values[large] / values[small]),
         )
+
+
+def _priced(subject: DiagnosedProblem, which: int) -> tuple[str, ...]:
+    """Return the soft constraints whose quadratic price makes a state or control dear."""
+    m = subject.ocp.model
+    symbol = ca.vertcat(m.x, m.u)[which]
+    return tuple(
+        c.name
+        for c in subject.written.at("path")
+        if c.soft is not None
+        and np.any(np.asarray(c.soft.quadratic) > 0.0)
+        and depends(c.expression, symbol)
+    )

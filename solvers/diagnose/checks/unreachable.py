@@ -60,7 +60,7 @@ def _rollout(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return psi - target (m,) under random controls, and its derivative in all that is free."""
     ocp = subject.ocp
-    u = _excited(subject, seed)
+    u = subject.excited(seed)
     # A free duration is doubled once, so that what only time moves is seen to move.
     duration = ocp.duration * (1.0 + seed * float(ocp.has_free_time))
     intervals = subject.program.grid
@@ -74,15 +74,6 @@ def _rollout(
     misses = psi - [target for *_, target in rows]
     finite = np.isfinite(misses).all() and np.isfinite(slopes).all()
     return (misses, slopes) if finite else None
-
-
-def _excited(subject: DiagnosedProblem, seed: int) -> np.ndarray:
-    """Return random controls within their bounds, or within 1 where they have none, (N, nu)."""
-    bounds, rng = subject.ocp.control_bounds, np.random.default_rng(seed)
-    low = np.where(np.isfinite(bounds.lower), bounds.lower, -1.0)
-    high = np.where(np.isfinite(bounds.upper), bounds.upper, 1.0)
-    shape = (subject.program.transcription.n, subject.ocp.model.nu)
-    return low + (high - low) * rng.uniform(size=shape)
 
 
 def _end(
@@ -102,6 +93,7 @@ def _backwards(
 ) -> np.ndarray:
     """Return how the ends answer to every control, and to a free duration and start, (m, ...)."""
     ocp, m, step = subject.ocp, subject.ocp.model, subject.program.transcription.step
+    starts = subject.start_directions
     names = ["jac:x_next:x", "jac:x_next:u0", "jac:x_next:h"]
     slopes = step.factory("slopes", step.name_in(), names).map(len(u))
     by_x, by_u, by_h = (np.array(v) for v in slopes(x.T, u.T, *inputs))
@@ -110,7 +102,7 @@ def _backwards(
         columns.append(answers @ by_u[:, k * m.nu : (k + 1) * m.nu])
         timed = timed + answers @ by_h[:, [k]]
         answers = answers @ by_x[:, k * m.nx : (k + 1) * m.nx]
-    columns += [timed] * ocp.has_free_time + [answers[:, ocp.start_is_free]]
+    columns += [timed] * ocp.has_free_time + [answers @ starts]
     return np.hstack(columns)
 
 

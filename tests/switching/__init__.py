@@ -1,0 +1,1 @@
+"""Tests of ``switched``: controls that take only listed values."""
