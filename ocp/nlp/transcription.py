@@ -82,6 +82,11 @@ class Transcription:
     def _fractions(self) -> np.ndarray:
         return node_fractions(self.ocp, self.n) if self.nodes is None else self.nodes
 
+    def with_time(self, x: np.ndarray, duration: float) -> np.ndarray:
+        """Return z (N + 1, nz): states (N + 1, nx), with final time minus t0 [s] if it is free."""
+        unknown = np.full((len(x), int(self.ocp.has_free_time)), duration / self.time_unit)
+        return np.hstack([x, unknown])
+
     def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
         return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])

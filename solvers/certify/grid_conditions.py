@@ -8,15 +8,15 @@ from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
 from ocp import RK4, Solution
-from ocp.internal import Transcription
+from ocp.internal import Transcription, sizes_of
 from solvers.certify.certificate import Check, Verdict
 
-# A bound this close, relative to 1 + abs(bound), is taken as active.
+# A bound this close, relative to its size and the typical one, is taken as active.
 _ACTIVE = 1e-5
 # Singular values below this share of the largest count as zero.
 _DEPENDENT = 1e-9
 # Of the gradient of the Lagrangian and of multipliers of the wrong sign, relative to the
-# largest entry of the cost's gradient and 1.
+# largest entry of the cost's gradient and 1, in typical sizes.
 _RESIDUAL = 1e-5
 # A multiplier this small, by the same measure, does not hold an inequality at its bound.
 _WEAK = 1e-5
@@ -31,11 +31,11 @@ CHECKS = INDEPENDENCE, STATIONARITY, CURVATURE
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """The program at one point.
+    """The program at one point, with unknowns and cost in typical sizes, so that no unit decides.
 
     Attributes:
         slope: gradient of the cost.
-        rows: gradients of the active constraints and bounds.
+        rows: gradients of the active constraints and bounds, of length one.
         signs: 1 where the multiplier may not be negative, -1 where not positive, else 0.
         names: what each active row says.
         multipliers: that fit the slope best; with no regard to signs where the rows are
@@ -82,11 +82,8 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
 
 
 def _point(transcription: Transcription, solution: Solution) -> _Point:
-    ocp, data = transcription.ocp, solution.data
-    z = solution.x
-    if ocp.has_free_time:
-        z = np.hstack([z, np.full((len(z), 1), solution.duration)])
-    w = transcription.join(z, solution.u)
+    data = solution.data
+    w = transcription.join(transcription.with_time(solution.x, solution.duration), solution.u)
     if not transcription.start_is_smooth(w, data):
         transcription = replace(transcription, start_as_data=True)
     p = transcription.data_vector(data)
@@ -102,26 +99,45 @@ def _point(transcription: Transcription, solution: Solution) -> _Point:
     second = ca.Function(
         "second", [unknowns, given, weights], [ca.hessian(lagrangian, unknowns)[0]]
     )
+    unit, cost = _sizes(transcription, solution)
     g, slope, jacobian = (np.array(a) for a in first(w, p))
-    in_g, signs_g = _active(g.ravel(), bounds["lbg"], bounds["ubg"])
-    in_w, signs_w = _active(w, bounds["lbx"], bounds["ubx"])
-    rows = np.vstack([jacobian[in_g], np.eye(len(w))[in_w]])
+    jacobian = jacobian * unit
+    in_g, signs_g = _active(g.ravel(), bounds["lbg"], bounds["ubg"], _lengths(jacobian))
+    in_w, signs_w = _active(w, bounds["lbx"], bounds["ubx"], unit)
+    lengths = _lengths(jacobian[in_g])
+    rows = np.vstack([jacobian[in_g] / lengths[:, None], np.eye(len(w))[in_w]])
     signs = np.concatenate([signs_g[in_g], signs_w[in_w]])
-    multipliers = _fitted(rows, signs, slope.ravel())
+    slope = slope.ravel() * unit / cost
+    multipliers = _fitted(rows, signs, slope)
     of_g = np.zeros(len(g))
-    of_g[in_g] = multipliers[: in_g.sum()]
+    of_g[in_g] = multipliers[: in_g.sum()] * cost / lengths
     names = [
         _of_row(row.name, row.node) for row, on in zip(transcription.rows, in_g, strict=True) if on
     ]
     names += [_of_unknown(transcription, int(i)) for i in np.flatnonzero(in_w)]
     return _Point(
-        slope=slope.ravel(),
+        slope=slope,
         rows=rows,
         signs=signs,
         names=tuple(names),
         multipliers=multipliers,
-        hessian=np.array(second(w, p, of_g)),
+        hessian=np.array(second(w, p, of_g)) * unit * unit[:, None] / cost,
     )
+
+
+def _sizes(transcription: Transcription, solution: Solution) -> tuple[np.ndarray, float]:
+    """Return typical sizes of all unknowns, and of the cost."""
+    sizes = sizes_of(transcription.ocp)
+    x, u = (
+        np.tile(size, (len(of), 1)) for size, of in ((sizes.x, solution.x), (sizes.u, solution.u))
+    )
+    return transcription.join(transcription.with_time(x, solution.duration), u), sizes.cost
+
+
+def _lengths(rows: np.ndarray) -> np.ndarray:
+    """Return the lengths of rows; of those that vanish 1."""
+    lengths = np.linalg.norm(rows, axis=1)
+    return np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _fitted(rows: np.ndarray, signs: np.ndarray, slope: np.ndarray) -> np.ndarray:
@@ -138,12 +154,14 @@ def _fitted(rows: np.ndarray, signs: np.ndarray, slope: np.ndarray) -> np.ndarra
 
 
 def _active(
-    value: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    value: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which bounds are met with equality, and the sign of their multipliers."""
     with np.errstate(invalid="ignore"):
-        at_lower = np.isfinite(lower) & (value - lower <= _ACTIVE * (1.0 + np.abs(lower)))
-        at_upper = np.isfinite(upper) & (upper - value <= _ACTIVE * (1.0 + np.abs(upper)))
+        at_lower = np.isfinite(lower) & (value - lower <= _ACTIVE * (size + np.abs(lower)))
+        at_upper = np.isfinite(upper) & (upper - value <= _ACTIVE * (size + np.abs(upper)))
+    is_equation = lower == upper
+    at_lower, at_upper = at_lower | is_equation, at_upper | is_equation
     return at_lower | at_upper, at_upper.astype(int) - at_lower.astype(int)
 
 
@@ -159,14 +177,14 @@ def _of_unknown(transcription: Transcription, index: int) -> str:
 
 
 def _independence(point: _Point) -> Check:
-    """LICQ; rows are scaled to length one, so that units do not decide."""
+    """LICQ."""
     rows, unknowns = point.rows.shape
     if rows > unknowns:
         return _dependent(f"{rows} active rows for {unknowns} unknowns", 0.0)
-    lengths = np.linalg.norm(point.rows, axis=1)
-    if (lengths == 0.0).any():
-        return _dependent(f"the gradient of {point.names[int(lengths.argmin())]} vanishes", 0.0)
-    values, turned = np.linalg.svd((point.rows / lengths[:, None]).T, full_matrices=False)[1:]
+    is_zero = ~point.rows.any(axis=1)
+    if is_zero.any():
+        return _dependent(f"the gradient of {point.names[int(is_zero.argmax())]} vanishes", 0.0)
+    values, turned = np.linalg.svd(point.rows.T, full_matrices=False)[1:]
     ratio = float(values[-1] / values[0])
     if ratio <= _DEPENDENT:
         name = point.names[int(np.abs(turned[-1]).argmax())]

@@ -209,9 +209,9 @@ class MultipleShootingProgram(MethodProgram):
         self, data: RunData, guess: InitialGuess | None, duration: float, source: FirstStates
     ) -> tuple[np.ndarray, np.ndarray]:
         x, u = self.grid.first_iterate(data, guess, duration, source)
-        blocks, length = self.transcription.blocks, duration / self.transcription.time_unit
+        blocks = self.transcription.blocks
         u = u if blocks is None else blocks.holding(u)
-        return np.hstack([x, np.full((len(x), int(self.ocp.has_free_time)), length)]), u
+        return self.transcription.with_time(x, duration), u
 
     def _costate(self, guess: InitialGuess | None) -> np.ndarray | None:
         """Return the costates of a guess with states, (N + 1, nx), for a backend that uses them."""

@@ -217,6 +217,29 @@ def test_the_grid_conditions_hold_at_an_optimum(build):
     assert all(check.verdict is Verdict.HOLDS for check in grid_checks(direct(build())))
 
 
+@pytest.mark.parametrize("metre", [1.0, 1e-4])
+def test_neither_time_units_nor_sizes_decide_on_the_grid(metre):
+    """A car over 1000 m in the least time, some 36 s, in metres and in units of 10 km."""
+    place, speed, force = (ca.SX.sym(name) for name in ("place", "speed", "force"))
+    thrust = (force - 2 * (speed / metre) ** 2) / 500
+    drive = OCP(
+        name="drive",
+        model=Model(
+            name="car", x=ca.vertcat(place, speed), u=force, f=ca.vertcat(speed, metre * thrust)
+        ),
+        x0=[0, 0],
+        horizon=FreeTime(30.0),
+        running_cost=1,
+        control_bounds=Box(-2500, 2500),
+        constraints=(
+            Constraint("there", place, 1000 * metre, 1000 * metre, at="terminal"),
+            Constraint("at rest", speed, 0, 0, at="terminal"),
+        ),
+    )
+    for check in grid_checks(direct(drive)):
+        assert check.verdict is Verdict.HOLDS, check
+
+
 def test_a_trajectory_that_is_not_optimal_is_seen():
     best = direct(integrator())
     bent = best.u + 0.05 * np.sin(2 * np.pi * best.t[:-1])[:, None]
