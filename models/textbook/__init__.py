@@ -1,6 +1,7 @@
 """Textbook problems, each with its source."""
 
 from models.textbook.around_discs import around_discs
+from models.textbook.bioreactor import bioreactor
 from models.textbook.brachistochrone import brachistochrone
 from models.textbook.collision_costs import BarrierCost, bounded_ocp, unbounded_ocp
 from models.textbook.consumption import consumption
@@ -22,6 +23,8 @@ from models.textbook.fishing import fishery, predator_and_prey
 from models.textbook.fuller import fuller
 from models.textbook.goddard import goddard
 from models.textbook.hanging_chain import hanging_chain
+from models.textbook.heated_rod import heated_rod
+from models.textbook.insurance import insurance
 from models.textbook.integrator import (
     integrator_free_time,
     integrator_free_time_quadratic,
@@ -34,7 +37,7 @@ from models.textbook.kinetics import alpha_pinene, gas_oil, methanol
 from models.textbook.least_peak import least_excursion, least_jerk
 from models.textbook.linear_hypersensitive import linear_hypersensitive
 from models.textbook.marine_population import marine_population
-from models.textbook.medicine import epidemic, tuberculosis, tumour
+from models.textbook.medicine import tuberculosis, tumour
 from models.textbook.mine import mine
 from models.textbook.oscillator_regulator import oscillator_regulator
 from models.textbook.oscillators import hypersensitive, rayleigh, rayleigh_constrained, van_der_pol
@@ -46,7 +49,6 @@ from models.textbook.staged_ascent import staged_ascent
 from models.textbook.state_constrained_mass import beam, breakwell, bryson_denham
 from models.textbook.tangent_steering import linear_tangent_steering
 from models.textbook.two_link_arm import two_link_arm_energy, two_link_arm_minimum_time
-from models.textbook.wheat import wheat
 from models.textbook.zermelo import zermelo
 
 __all__ = [
@@ -54,6 +56,7 @@ __all__ = [
     "alpha_pinene",
     "around_discs",
     "beam",
+    "bioreactor",
     "bounded_ocp",
     "brachistochrone",
     "breakwell",
@@ -67,7 +70,6 @@ __all__ = [
     "double_integrator_fuel",
     "double_integrator_minimum_time",
     "electric_vehicle",
-    "epidemic",
     "exponential_energy",
     "exponential_fuel",
     "exponential_minimum_time",
@@ -76,7 +78,9 @@ __all__ = [
     "gas_oil",
     "goddard",
     "hanging_chain",
+    "heated_rod",
     "hypersensitive",
+    "insurance",
     "integrator_free_time",
     "integrator_free_time_quadratic",
     "isoperimetric",
@@ -107,6 +111,5 @@ __all__ = [
     "two_link_arm_minimum_time",
     "unbounded_ocp",
     "van_der_pol",
-    "wheat",
     "zermelo",
 ]

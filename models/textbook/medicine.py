@@ -1,4 +1,4 @@
-"""Medicine: a tumour that is starved, tuberculosis in a town, an epidemic below a limit."""
+"""Medicine: a tumour that is starved, tuberculosis in a town."""
 
 import casadi as ca
 import numpy as np
@@ -88,38 +88,4 @@ def tuberculosis() -> OCP:
         horizon=5.0,
         running_cost=other + resistant + 25.0 * u[0] ** 2 + 250.0 * u[1] ** 2,
         control_bounds=Box(0.05, 0.95),
-    )
-
-
-def epidemic() -> OCP:
-    r"""Keep an epidemic below what hospitals hold, with the least isolation.
-
-    .. math::
-
-        \min \int_0^{200} u \, dt, \quad \dot s = -0.727 (1 - u) s i, \;
-        \dot e = 0.727 (1 - u) s i - 0.35 e, \; \dot i = 0.35 e - 0.303 i, \quad
-        0 \le u \le 0.8, \; i \le 0.02
-
-    (s, e, i)(0) = (1 - 10^{-5}, 10^{-5}, 0): parts of the people, t in days.
-
-    Optimum: 29.90; the limit acts for weeks, and isolation follows it. Problem: [InfiniteOpt], at
-    one of its rates of incubation.
-    """
-    s, e, i, u = (ca.SX.sym(name) for name in ("s", "e", "i", "u"))
-    new = 0.727 * (1.0 - u) * s * i
-    return OCP(
-        name="epidemic",
-        model=Model(
-            name="epidemic",
-            x=ca.vertcat(s, e, i),
-            u=u,
-            f=ca.vertcat(-new, new - 0.35 * e, 0.35 * e - 0.303 * i),
-            x_nominal=[1.0, 0.01, 0.01],
-        ),
-        x0=[1.0 - 1e-5, 1e-5, 0.0],
-        horizon=200.0,
-        running_cost=u,
-        control_bounds=Box(0.0, 0.8),
-        constraints=(Constraint("hospitals", i, upper=0.02),),
-        guess=Guess(u=[0.3]),
     )

@@ -1,4 +1,4 @@
-"""Closed forms of fishing, digging, spending, turning round, and going round obstacles."""
+"""Closed forms of fishing, digging, spending, turning round, cooling, and of ways around discs."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -7,10 +7,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import brentq, minimize_scalar
 
 from benchmarks.cases import LIBRARY
+from models.textbook import rod_pendulum
 from models.textbook.around_discs import CENTRES, END, SQUARE
+from ocp import OCP, Constraint, Model, solve
+from solvers import Collocation
 from tests.tolerances import CERTIFIED, ROUNDING
 
 CASES = {case.name: case for case in LIBRARY}
@@ -124,6 +128,27 @@ def consumption() -> float:
     return driven("consumption", lambda t: 100.0 + first * np.exp(-t / 40.0))
 
 
+# -- a rod: Riccati's equation without its ends ---------------------------------------------------
+
+
+def heated_rod() -> float:
+    """The recursion over short steps, since the exponential over all of them loses its digits."""
+    inside, width, take = 5, 1.0 / 6.0, 2.0
+    share = 1.0 / (1.0 + take * width)  # of the first inner temperature in that of the end
+    a = np.diag(np.full(inside, -2.0)) + np.eye(inside, k=1) + np.eye(inside, k=-1)
+    a[0, 0] += share
+    a[-1, -1] += 1.0
+    b = np.zeros((inside, 1))
+    b[0] = 1.0 - share
+    a, b = 0.2 / width**2 * a, 0.2 / width**2 * b
+    steps, p = 50, np.zeros((inside, inside))
+    flow = expm(2.0 / steps * np.block([[a, -b @ b.T / 1e-2], [-width * np.eye(inside), -a.T]]))
+    (f, g), (h, i) = (np.hsplit(rows, 2) for rows in np.vsplit(flow, 2))
+    for _ in range(steps):
+        p = np.linalg.solve(i - p @ g, p @ f - h)
+    return float(np.ones(inside) @ p @ np.ones(inside))
+
+
 # -- the largest value ----------------------------------------------------------------------------
 
 
@@ -147,6 +172,7 @@ ROOTS: dict[str, Callable[[], float]] = {
     "mine": lambda: driven("mine", lambda t: 5.0 * (6.0 - t) / 9.0),
     "least-jerk": least_jerk,
     "least-excursion": least_excursion,
+    "heated-rod": heated_rod,
 }
 
 
@@ -155,6 +181,31 @@ def test_the_derivation_gives_the_reference(name: str) -> None:
     reference = CASES[name].reference
     assert reference is not None
     assert ROOTS[name]() == pytest.approx(reference.value, rel=CERTIFIED, abs=reference.error)
+
+
+def test_the_pendulum_on_a_rod_is_the_one_in_the_angle() -> None:
+    """Cartesian coordinates with the force of the rod, and the angle from straight below."""
+    angle, rate, push = (ca.SX.sym(name) for name in ("angle", "rate", "push"))
+    below = Constraint("below", ca.vertcat(angle, rate), [0.0, 0.0], [0.0, 0.0], at="terminal")
+    swing = OCP(
+        name="angle",
+        model=Model(
+            name="pendulum",
+            x=ca.vertcat(angle, rate),
+            u=push,
+            f=ca.vertcat(rate, -9.81 * ca.sin(angle) - push),
+        ),
+        x0=[np.pi / 2.0, 0.0],
+        horizon=3.0,
+        running_cost=push**2,
+        constraints=(below,),
+    )
+    on_its_rod = solve(rod_pendulum(), Collocation(20, degree=5)).or_raise()
+    found = solve(swing, Collocation(20, degree=5)).or_raise()
+    assert found.cost == pytest.approx(on_its_rod.cost, rel=1e-7)
+    drift = (on_its_rod.x[:, :2] ** 2).sum(axis=1) - 1.0
+    assert np.abs(drift).max() < 1e-5  # what 20 intervals leave: no equation holds it
+    np.testing.assert_allclose(on_its_rod.x[:, 0], np.sin(found.x[:, 0]), atol=1e-4)
 
 
 def test_no_other_stock_is_better_on_the_singular_arc() -> None:
