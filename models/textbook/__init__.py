@@ -24,7 +24,7 @@ from models.textbook.fuller import fuller
 from models.textbook.goddard import goddard
 from models.textbook.hanging_chain import hanging_chain
 from models.textbook.heated_rod import heated_rod
-from models.textbook.insurance import insurance
+from models.textbook.hiv import hiv
 from models.textbook.integrator import (
     integrator_free_time,
     integrator_free_time_quadratic,
@@ -79,8 +79,8 @@ __all__ = [
     "goddard",
     "hanging_chain",
     "heated_rod",
+    "hiv",
     "hypersensitive",
-    "insurance",
     "integrator_free_time",
     "integrator_free_time_quadratic",
     "isoperimetric",

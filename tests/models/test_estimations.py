@@ -12,6 +12,8 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from benchmarks.cases import LIBRARY
 from models.textbook import alpha_pinene, gas_oil, marine_population, methanol
+from models.textbook.hiv import LOADS
+from models.textbook.hiv import TIMES as HIV_TIMES
 from models.textbook.kinetics import (
     GAS_OIL,
     GAS_OIL_TIMES,
@@ -77,6 +79,20 @@ def converted(k: np.ndarray) -> np.ndarray:
     return integrated(lambda t, y: carbene_gone(y, k), [1.0, 0.0, 0.0], METHANOL_TIMES)
 
 
+def loads(k: np.ndarray) -> np.ndarray:
+    """log10 of the viral load, with its logarithm as the state."""
+    rate = 10.0**k
+
+    def change(t: float, z: np.ndarray) -> list[float]:
+        healthy, infected, virus = z[0], z[1], np.exp(z[2])
+        new = rate[2] * healthy * virus
+        grown = -rate[2] * healthy - rate[4] + 100.0 * infected / virus
+        return [rate[0] - rate[1] * healthy - new, new - rate[3] * infected, grown]
+
+    curve = integrated(change, [1e6, 0.0, np.log(100.0)], HIV_TIMES)
+    return curve[:, 2] / np.log(10.0)
+
+
 # case: the curves, what was measured, a first guess.
 FITS: dict[str, tuple[Callable, np.ndarray, np.ndarray]] = {
     "alpha-pinene": (pinene, PINENE, np.array([5.0, 3.0, 2.0, 20.0, 5.0])),
@@ -93,7 +109,6 @@ FITS: dict[str, tuple[Callable, np.ndarray, np.ndarray]] = {
 @cache
 def fitted(name: str) -> OptimizeResult:
     curves, measured, guess = FITS[name]
-    # A bound that is active is met exactly: the optimiser itself stays inside.
     return least_squares(
         lambda k: (curves(k) - measured).ravel(), guess, bounds=(0.0, np.inf), **_FIT
     )
@@ -110,6 +125,24 @@ def test_least_squares_of_scipy_are_the_reference(name: str) -> None:
     assert 2.0 * fitted(name).cost == pytest.approx(
         reference.value, abs=reference.error, rel=CERTIFIED
     )
+
+
+@pytest.mark.slow
+def test_the_infection_costs_its_reference_in_a_flat_valley() -> None:
+    reference = CASES["hiv"].reference
+    best = np.array([5.51232818, -0.90333438, -6.49473444, 1.1452756, -0.40659862])
+
+    def cost(k: np.ndarray) -> float:
+        return float(((loads(k) - LOADS) ** 2).sum())
+
+    assert reference is not None
+    assert cost(best) == pytest.approx(reference.value, abs=reference.error, rel=CERTIFIED)
+    for step in 1e-3 * np.eye(5):
+        assert min(cost(best - step), cost(best + step)) > reference.lower
+    local = np.array([5.51759325, -0.44222757, -6.68126263, 0.1204245, 0.55004322])
+    assert cost(local) == pytest.approx(CASES["hiv"].local_costs[0], rel=1e-6)
+    printed = np.array([5.0, -0.838, -6.799, -0.376, 0.700])
+    assert cost(printed) == pytest.approx(CASES["hiv"].published[0].value, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from benchmarks.cases.case import Published
 from benchmarks.cases.library.entry import DIRECT, DOLAN, certified, computed, entry
-from models.textbook import alpha_pinene, gas_oil, marine_population, methanol
+from models.textbook import alpha_pinene, gas_oil, hiv, marine_population, methanol
 
 _GAUSS = "Gauss and Newton on scipy's integration of the variational equations"
 _LINEAR = "Gauss and Newton on exponentials of the matrix of rates"
@@ -43,5 +43,16 @@ ESTIMATION = (
         "smooth",
         DOLAN,
         published=(Published(19.747, f"{DOLAN}, in thousands"),),
+    ),
+    entry(
+        hiv,
+        "hiv",
+        computed(15.160090871, 2e-8, f"{_GAUSS}, and Radau collocation"),
+        # No direct method: fatrop does not return, and IPOPT takes its time.
+        ("collocation",),
+        "long",
+        "[GEKKO]",
+        published=(Published(31.410909, "[GEKKO]: at its rates"),),
+        local_costs=(15.37723,),
     ),
 )
