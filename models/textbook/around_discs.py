@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from models.textbook.ends import ends_at
-from ocp import OCP, Constraint, FreeTime, Guess, Model
+from ocp import OCP, Box, Constraint, FreeTime, Guess, Model
 
 # Centres of the discs, the square of their radius, where the way ends.
 CENTRES, SQUARE, END = ((0.4, 0.5), (0.8, 1.5)), 0.1, (1.2, 1.6)
@@ -40,6 +40,7 @@ def around_discs() -> OCP:
         x0=[0.0, 0.0],
         horizon=FreeTime(2.2, lower=0.1),
         running_cost=1.0,
+        control_bounds=Box(-np.pi, np.pi),  # a heading is one up to whole turns
         constraints=(*ends_at(place, END), *rows),
         guess=Guess(x=ends, u=[[0.4], [0.7], [1.2], [1.2]]),
     )
