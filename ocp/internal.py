@@ -56,7 +56,7 @@ from ocp.problem.control_blocks import ControlBlocks
 from ocp.problem.elastic import elastic
 from ocp.problem.epigraph import Epigraph, epigraph
 from ocp.problem.grid import check_intervals, cut, number_of
-from ocp.problem.node_fractions import node_fractions, node_widths
+from ocp.problem.node_fractions import instant_fractions, node_fractions, node_widths
 from ocp.problem.nominal_sizes import Sizes, time_unit
 from ocp.problem.parameters import ParameterValues, Steps
 from ocp.problem.portable import Portable
@@ -143,6 +143,7 @@ __all__ = [
     "excess",
     "external",
     "hamiltonian",
+    "instant_fractions",
     "interpolate",
     "interruptible",
     "judged",

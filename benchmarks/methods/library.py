@@ -1,7 +1,10 @@
 """The methods of the suite ``library``, each from the problem's own guess or the direct answer."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
+
+import numpy as np
 
 from benchmarks.cases import Case, Family
 from benchmarks.methods.library_tolerances import INTERVALS, USUAL
@@ -57,7 +60,9 @@ def _indirect(case: Case, settings: Settings) -> Outcome:
 
 
 def _collocation(case: Case, settings: Settings) -> Outcome:
-    return judged(refine_mesh(_coarse(case), solver=FIRST_MESH, accuracy=DEFECT).solution)
+    instants = {float(time) for m in problem(case).data for time in np.asarray(m.times)}
+    first = replace(FIRST_MESH, intervals=max(FIRST_MESH.intervals, len(instants) + 1))
+    return judged(refine_mesh(_coarse(case), solver=first, accuracy=DEFECT).solution)
 
 
 def _extremal(case: Case, settings: Settings) -> Outcome:

@@ -1,7 +1,10 @@
 """Textbook problems, each with its source."""
 
+from models.textbook.around_discs import around_discs
+from models.textbook.bioreactor import bioreactor
 from models.textbook.brachistochrone import brachistochrone
 from models.textbook.collision_costs import BarrierCost, bounded_ocp, unbounded_ocp
+from models.textbook.consumption import consumption
 from models.textbook.double_integrator import (
     discrete_double_integrator,
     double_integrator_bounded_energy,
@@ -16,9 +19,12 @@ from models.textbook.exponential import (
     exponential_fuel,
     exponential_minimum_time,
 )
+from models.textbook.fishing import fishery, predator_and_prey
 from models.textbook.fuller import fuller
 from models.textbook.goddard import goddard
 from models.textbook.hanging_chain import hanging_chain
+from models.textbook.heated_rod import heated_rod
+from models.textbook.hiv import hiv
 from models.textbook.integrator import (
     integrator_free_time,
     integrator_free_time_quadratic,
@@ -27,12 +33,18 @@ from models.textbook.integrator import (
     turnpike,
 )
 from models.textbook.isoperimetric import isoperimetric
+from models.textbook.kinetics import alpha_pinene, gas_oil, methanol
+from models.textbook.least_peak import least_excursion, least_jerk
 from models.textbook.linear_hypersensitive import linear_hypersensitive
+from models.textbook.marine_population import marine_population
+from models.textbook.medicine import tuberculosis, tumour
+from models.textbook.mine import mine
 from models.textbook.oscillator_regulator import oscillator_regulator
 from models.textbook.oscillators import hypersensitive, rayleigh, rayleigh_constrained, van_der_pol
 from models.textbook.pendulum import pendulum_minimum_time, pendulum_swing_up
 from models.textbook.polar_arm import polar_arm
-from models.textbook.reactors import catalyst_mixing, two_catalysts
+from models.textbook.reactors import catalyst_mixing, parallel_reactions, two_catalysts
+from models.textbook.rod_pendulum import rod_pendulum
 from models.textbook.staged_ascent import staged_ascent
 from models.textbook.state_constrained_mass import beam, breakwell, bryson_denham
 from models.textbook.tangent_steering import linear_tangent_steering
@@ -41,12 +53,16 @@ from models.textbook.zermelo import zermelo
 
 __all__ = [
     "BarrierCost",
+    "alpha_pinene",
+    "around_discs",
     "beam",
+    "bioreactor",
     "bounded_ocp",
     "brachistochrone",
     "breakwell",
     "bryson_denham",
     "catalyst_mixing",
+    "consumption",
     "discrete_double_integrator",
     "double_integrator_bounded_energy",
     "double_integrator_distance",
@@ -57,24 +73,38 @@ __all__ = [
     "exponential_energy",
     "exponential_fuel",
     "exponential_minimum_time",
+    "fishery",
     "fuller",
+    "gas_oil",
     "goddard",
     "hanging_chain",
+    "heated_rod",
+    "hiv",
     "hypersensitive",
     "integrator_free_time",
     "integrator_free_time_quadratic",
     "isoperimetric",
+    "least_excursion",
+    "least_jerk",
     "linear_hypersensitive",
     "linear_tangent_steering",
+    "marine_population",
+    "methanol",
+    "mine",
     "mixed_constraint",
     "moving_floor",
     "oscillator_regulator",
+    "parallel_reactions",
     "pendulum_minimum_time",
     "pendulum_swing_up",
     "polar_arm",
+    "predator_and_prey",
     "rayleigh",
     "rayleigh_constrained",
+    "rod_pendulum",
     "staged_ascent",
+    "tuberculosis",
+    "tumour",
     "turnpike",
     "two_catalysts",
     "two_link_arm_energy",

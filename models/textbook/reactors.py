@@ -1,4 +1,4 @@
-"""Chemical reactors: mixing two catalysts along a tube, or in time."""
+"""Chemical reactors: two catalysts along a tube or in time, two reactions side by side."""
 
 import casadi as ca
 
@@ -54,4 +54,27 @@ def two_catalysts() -> OCP:
         horizon=4.0,
         terminal_cost=-c,
         control_bounds=Box(0.0, 1.0),
+    )
+
+
+def parallel_reactions() -> OCP:
+    r"""Heat a reactor so that most of the first substance becomes the wanted one.
+
+    .. math::
+
+        \min -b(1), \quad \dot a = -(u + u^2/2) a, \; \dot b = u a, \; 0 \le u \le 5, \quad
+        (a, b)(0) = (1, 0)
+
+    Optimum: -0.5735451; u grows, and meets its bound near the end. Problem: [Bachmann et al. 2012].
+    """
+    a, b, u = (ca.SX.sym(name) for name in ("a", "b", "u"))
+    return OCP(
+        name="parallel reactions",
+        model=Model(
+            name="batch", x=ca.vertcat(a, b), u=u, f=ca.vertcat(-(u + u**2 / 2.0) * a, u * a)
+        ),
+        x0=[1.0, 0.0],
+        horizon=1.0,
+        terminal_cost=-b,
+        control_bounds=Box(0.0, 5.0),
     )

@@ -47,7 +47,7 @@ def node_fractions(ocp: OCP, intervals: int | Grid) -> np.ndarray:
     if ocp.model.is_discrete:
         return np.linspace(0.0, 1.0, (ocp.steps or intervals) + 1)
     uniform = np.linspace(0.0, 1.0, intervals + 1)
-    count = len(_steps(ocp))
+    count = len(instant_fractions(ocp))
     if count >= intervals:
         raise ProblemError(
             f"{ocp.name}: the {count} instants of its data or constraints need more than {count} "
@@ -72,7 +72,7 @@ def node_widths(nodes: np.ndarray) -> np.ndarray:
 def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
     """Yield inner knots: all, where the samples bend, where they jump, instants alone."""
     signals = [entry for entry in ocp.parameters if isinstance(entry, Signal)]
-    steps = _steps(ocp)
+    steps = instant_fractions(ocp)
     for which in (_all, _bending, _jumping):
         each = [which(signal) for signal in signals]
         found = np.sort(np.concatenate([steps, *each]))
@@ -80,8 +80,11 @@ def _candidates(ocp: OCP) -> Iterator[np.ndarray]:
     yield steps
 
 
-def _steps(ocp: OCP) -> np.ndarray:
-    """Return the instants inside the horizon at which something is, each once, (K,)."""
+def instant_fractions(ocp: OCP) -> np.ndarray:
+    """Return the instants of data and constraints inside the horizon of a normal form.
+
+    Each once, as fractions of the horizon, (K,).
+    """
     each = [entry.inner for entry in ocp.parameters if isinstance(entry, Steps)]
     found = np.sort(np.concatenate([np.zeros(0), *each]))
     return found[np.diff(found, prepend=0.0) > _SAME]
@@ -89,9 +92,10 @@ def _steps(ocp: OCP) -> np.ndarray:
 
 def _with_steps(ocp: OCP, nodes: np.ndarray) -> np.ndarray:
     """Return nodes that a user gave, if the instants of data and constraints are among them."""
-    apart = np.abs(_steps(ocp)[:, None] - nodes).min(axis=1) > _SAME
+    instants = instant_fractions(ocp)
+    apart = np.abs(instants[:, None] - nodes).min(axis=1) > _SAME
     if apart.any():
-        missing = float(_steps(ocp)[apart.argmax()])
+        missing = float(instants[apart.argmax()])
         raise ProblemError(
             f"{ocp.name}: the grid has no node at {missing:.6g} of the horizon, where there are "
             "data or a constraint: add it by Grid.with_nodes"

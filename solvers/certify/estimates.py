@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp import OCP, Box, Solution, Status, UnsupportedProblem, evaluate
+from ocp.internal import instant_fractions
 from solvers.certify.certificate import Estimate
 from solvers.certify.local_error import PARTS, local_error
 from solvers.collocation.collocation import Collocation
@@ -101,7 +102,8 @@ def by_collocation(coarse: Solution, points: Family = "radau") -> Estimate:
     Raises:
         NoEstimateError: if no mesh is solved.
     """
-    solver = Collocation(intervals=_INTERVALS, points=points, tolerance=BARRIER)
+    first = max(_INTERVALS, len(instant_fractions(coarse.problem)) + 1)
+    solver = Collocation(intervals=first, points=points, tolerance=BARRIER)
     try:
         found = refine_mesh(coarse, solver=solver, accuracy=_DEFECT)
     except UnsupportedProblem as reason:

@@ -55,8 +55,16 @@ def test_the_library_is_large_and_of_all_kinds() -> None:
     }  # fmt: skip
 
 
+# Some seconds each: 61 and 168 measurements, each with a state of its own.
+_LONG = {"hiv", "marine-population"}
+_SOLVED = [
+    pytest.param(case, id=case.name, marks=pytest.mark.slow if case.name in _LONG else ())
+    for case in LIBRARY
+]
+
+
 @pytest.mark.many
-@each
+@pytest.mark.parametrize("case", _SOLVED)
 def test_direct_confirms_the_reference(case: Case) -> None:
     """The same solver, grid and tolerance as in the sweep; and its costates where known."""
     solution = solve(case.build(), MultipleShooting(INTERVALS.get(case.difficulty, USUAL)[0]))

@@ -8,8 +8,26 @@ from hypothesis import strategies as st
 
 from benchmarks.cases import LIBRARY
 from models.textbook import beam, bryson_denham, double_integrator_energy, van_der_pol
-from ocp import OCP, Box, Constraint, FreeTime, Model, Signal, evaluate, solve
-from solvers import Certificate, Collocation, MultipleShooting, polish
+from ocp import (
+    OCP,
+    Box,
+    Constraint,
+    FreeTime,
+    Measurement,
+    Model,
+    Signal,
+    Unknown,
+    evaluate,
+    solve,
+)
+from solvers import (
+    Certificate,
+    CertifyOptions,
+    Collocation,
+    MultipleShooting,
+    certify,
+    polish,
+)
 from solvers.certify.certificate import AGREEMENT, Check, Estimate, Verdict, agreement
 from solvers.certify.estimates import extrapolated
 from solvers.certify.global_evidence import convexity, other_data
@@ -333,3 +351,20 @@ def test_a_derivation_that_agrees_stands_for_the_second_method(verdict, holds):
     alone = Certificate("x", (best, best), (Check(AGREEMENT, Verdict.FAILS, ""),))
     assert not alone.holds
     assert alone.beside(Check("closed form", verdict, "")).holds is holds
+
+
+@pytest.mark.slow
+def test_data_at_many_instants_are_nodes_of_every_mesh():
+    """More of them than the first mesh of collocation would have intervals."""
+    x, k, times = ca.SX.sym("x"), ca.SX.sym("k"), np.arange(1.0, 13.0) / 13.0
+    seen = np.exp(-times) + 0.01 * (-1.0) ** np.arange(12)
+    ocp = OCP(
+        name="decay",
+        model=Model(name="decay", x=x, u=ca.SX(0, 1), f=-k * x),
+        x0=[1.0],
+        horizon=1.0,
+        unknowns=(Unknown("rate", k, 0.7, 0.0, 5.0),),
+        data=(Measurement("seen", x, times, seen),),
+    )
+    certificate = certify(direct(ocp, 26), CertifyOptions(intervals=26, starts=1))
+    assert any("collocation" in e.method for e in certificate.estimates)

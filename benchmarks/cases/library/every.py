@@ -3,6 +3,11 @@
 from benchmarks.cases.case import Case
 from benchmarks.cases.library.chapter_2 import CHAPTER_2
 from benchmarks.cases.library.closed_forms import CLOSED_FORMS
+from benchmarks.cases.library.economics import ECONOMICS
+from benchmarks.cases.library.estimation import ESTIMATION
+from benchmarks.cases.library.life import LIFE
+from benchmarks.cases.library.min_max import MIN_MAX
+from benchmarks.cases.library.processes import PROCESSES
 from benchmarks.cases.library.robots import ROBOTS
 from benchmarks.cases.library.smooth import SMOOTH_PROBLEMS
 from benchmarks.cases.library.state_constraints import STATE_CONSTRAINTS
@@ -13,6 +18,11 @@ LIBRARY: tuple[Case, ...] = (
     *SMOOTH_PROBLEMS,
     *SWITCHING,
     *STATE_CONSTRAINTS,
+    *MIN_MAX,
+    *ECONOMICS,
+    *LIFE,
+    *PROCESSES,
+    *ESTIMATION,
     *ROBOTS,
     *CHAPTER_2,
 )
