@@ -86,6 +86,18 @@ class Transcription:
         """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
         return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])
 
+    def iterate(self, x: np.ndarray, u: np.ndarray, duration: float) -> np.ndarray:
+        """Return the vector of unknowns of a trajectory.
+
+        Args:
+            x: states at the nodes (N + 1, nx).
+            u: controls of the intervals (N, nu).
+            duration: final time minus t0 [s]; it counts where the final time is free.
+        """
+        if not self.ocp.has_free_time:
+            return self.join(x, u)
+        return self.join(np.hstack([x, np.full((len(x), 1), duration / self.time_unit)]), u)
+
     def split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return z (N + 1, nz) and u (N, nu) of a vector of unknowns."""
         stages = w[: -self.nz].reshape(self.n, -1)

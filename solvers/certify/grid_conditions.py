@@ -82,11 +82,8 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
 
 
 def _point(transcription: Transcription, solution: Solution) -> _Point:
-    ocp, data = transcription.ocp, solution.data
-    z = solution.x
-    if ocp.has_free_time:
-        z = np.hstack([z, np.full((len(z), 1), solution.duration)])
-    w = transcription.join(z, solution.u)
+    data = solution.data
+    w = transcription.iterate(solution.x, solution.u, solution.duration)
     if not transcription.start_is_smooth(w, data):
         transcription = replace(transcription, start_as_data=True)
     p = transcription.data_vector(data)
