@@ -27,7 +27,7 @@ def orbit_raise() -> Phases:
     acceleration, which grows as fuel is burnt. In three phases of free durations: a burn with
     \|u\| <= 30°, a coast in which a does not act and rests, a second burn. The cost is what the
     speed changes by. Optimum: 0.39948783, twice through about 0.2. Problem: an example of dymos,
-    after [Enright & Conway 1992].
+    after [Enright 1991].
     """
     burn = Model(
         name="burn",
