@@ -26,7 +26,7 @@ def periodic_algae() -> OCP:
     Optimum: 0.614134 (the cost is its negative). Problem: [Bonnans et al. 2017].
     """
     y, s, b, u, t = (ca.SX.sym(name) for name in ("algae", "dissolved", "bacteria", "flow", "t"))
-    # Squared after the cut, so that the derivative is continuous at dawn.
+    # Squared after the cut: at dawn and dusk the first derivative is continuous, the second is not.
     light = ca.fmax(0.0, ca.sin(2.0 * np.pi * t / DAY)) ** 2
     growth = RATE * s / (HALF + s)
     model = Model(
@@ -48,6 +48,7 @@ def periodic_algae() -> OCP:
         horizon=DAY,
         running_cost=-SHARE * growth * b,
         control_bounds=Box(0.0, 1.0),
+        smoothness=1,
         constraints=(Constraint("period", model.x - model.start, 0.0, 0.0, at="terminal"),),
         guess=Guess(x=[[1.5, 0.5, 2.0], [2.5, 0.5, 2.0], [1.5, 0.5, 2.0]], u=[0.1]),
     )

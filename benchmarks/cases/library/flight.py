@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.cases.case import Published
 from benchmarks.cases.library.entry import DIRECT, SMOOTH, certified, entry, root
-from models.textbook import moon_landing, orbit_transfer, shuttle_reentry
+from models.textbook import hang_glider, moon_landing, orbit_transfer, shuttle_reentry
 
 FLIGHT = (
     entry(
@@ -24,6 +24,15 @@ FLIGHT = (
         "smooth",
         "[Bryson & Ho 1975, section 2.5]",
         published=(Published(-1.525, "[Bryson & Ho 1975, section 2.5]"),),
+    ),
+    entry(
+        hang_glider,
+        "hang-glider",
+        certified("hang-glider"),
+        # Where the lift meets its bound within an interval a refined mesh keeps an error of 3e-9.
+        ("direct",),
+        "long",
+        "[Bulirsch et al. 1993], data of [Dolan, More & Munson 2004]",
     ),
     entry(
         shuttle_reentry,
