@@ -18,8 +18,8 @@ MAY_IMPORT = {
     "solvers": {"ocp"},
     "benchmarks": {"ocp", "models", "solvers"},
 }
-# Besides its root, what another package may import from: robots, bodies in space, textbook problems,
-# and what siblings share but users need not know.
+# Besides its root, what another package may import from: robots, bodies in space, textbook
+# problems, and what siblings share but users need not know.
 ENTRANCES = {
     *LIBRARIES,
     "models.robot",

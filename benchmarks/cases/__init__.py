@@ -1,7 +1,15 @@
 """The one problem library: benchmarks and tests take their problems from here."""
 
 from benchmarks.cases.arm import arm_cases, arm_parts, arm_scenario, comparison_cases
-from benchmarks.cases.case import Case, Difficulty, Family, Published, Reference
+from benchmarks.cases.case import (
+    Case,
+    Difficulty,
+    Family,
+    KnownOptimum,
+    PhasesCase,
+    Published,
+    Reference,
+)
 from benchmarks.cases.clearance import (
     Kind,
     clearance_cases,
@@ -10,6 +18,7 @@ from benchmarks.cases.clearance import (
     soft_optimum,
 )
 from benchmarks.cases.library.every import LIBRARY, TEXTBOOK
+from benchmarks.cases.library.phases import PHASES
 from benchmarks.cases.links import link_cases
 
 
@@ -26,11 +35,14 @@ def all_cases() -> tuple[Case, ...]:
 
 __all__ = [
     "LIBRARY",
+    "PHASES",
     "TEXTBOOK",
     "Case",
     "Difficulty",
     "Family",
     "Kind",
+    "KnownOptimum",
+    "PhasesCase",
     "Published",
     "Reference",
     "all_cases",

@@ -1,11 +1,11 @@
-"""A benchmark case: a problem, its reference interval, and which methods it is a fixture for."""
+"""A benchmark case: a problem or phases, its reference, and which methods it is a fixture for."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
-from ocp import OCP, ProblemError
+from ocp import OCP, Phases, ProblemError
 
 Family = Literal[
     "direct",
@@ -83,31 +83,27 @@ class Published:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Case:
-    """A problem with a reference.
+class KnownOptimum:
+    """What is known of a problem, whatever it is built of.
 
     Attributes:
         name: unique in the library.
         suite: the suite it belongs to.
-        build: returns the problem; called in the process that solves it.
         source: where the problem comes from.
         reference: an interval around the optimal cost; None where none is certified.
         difficulty: what makes it hard, in a word.
         families: methods that the case declares.
         published: values found in print.
-        costate0: dJ*/dx at t0 where known.
         local_costs: other local minima that have been seen.
     """
 
     name: str
     suite: str
-    build: Callable[[], OCP]
     source: str
     reference: Reference | None
     difficulty: Difficulty
     families: frozenset[Family] = frozenset()
     published: tuple[Published, ...] = ()
-    costate0: tuple[float, ...] | None = None
     local_costs: tuple[float, ...] = ()
 
     def gap(self, cost: float) -> float | None:
@@ -120,3 +116,27 @@ class Case:
         """Return the relative error of each published value; without a reference none."""
         gaps = [self.gap(published.value) for published in self.published]
         return tuple(gap for gap in gaps if gap is not None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case(KnownOptimum):
+    """A problem with a reference.
+
+    Attributes:
+        build: returns the problem; called in the process that solves it.
+        costate0: dJ*/dx at t0 where known.
+    """
+
+    build: Callable[[], OCP]
+    costate0: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhasesCase(KnownOptimum):
+    """Phases with a reference. They are no case of a sweep, whose methods take one problem.
+
+    Attributes:
+        build: returns the phases.
+    """
+
+    build: Callable[[], Phases]

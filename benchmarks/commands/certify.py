@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from benchmarks.cases import Case, all_cases
+from benchmarks.cases import LIBRARY, PHASES, Case, PhasesCase, all_cases
 from benchmarks.cases.library.certificates import COMMITTED, Certificates
 from benchmarks.cases.library.certify_case import certify_case
 from benchmarks.commands.command import Command
@@ -16,8 +16,6 @@ from benchmarks.commands.options import named, positive
 from benchmarks.sweep.row import versions
 from ocp import OCPError
 from solvers import CertifyOptions
-
-_SUITE = "library"
 
 
 def _options(parser: ArgumentParser) -> None:
@@ -60,13 +58,13 @@ def _run(options: Namespace, console: Console) -> int:
     return int(bool(failed))
 
 
-def _wanted(names: list[str]) -> list[Case]:
+def _wanted(names: list[str]) -> list[Case | PhasesCase]:
     if names:
-        return named(all_cases(), names, "case", by_beginning=True)
-    return [case for case in all_cases() if case.suite == _SUITE]
+        return named((*all_cases(), *PHASES), names, "case", by_beginning=True)
+    return [*LIBRARY, *PHASES]
 
 
-def _table(cases: list[Case], on_file: Certificates) -> Table:
+def _table(cases: list[Case | PhasesCase], on_file: Certificates) -> Table:
     """One line a case, and one more for each published value."""
     table = Table(title="certified values, and what is in print")
     for column in ("case", "certified", "+-", "digits", "published", "its error", "source"):

@@ -56,6 +56,28 @@ def integrator_free_time_quadratic() -> OCP:
     )
 
 
+def integrator_priced_end() -> OCP:
+    r"""Come near zero for a price of what is missing.
+
+    .. math::
+
+        \min \tfrac12 \int_0^{10} u^2 \, dt + \tfrac52 x(10)^2, \quad \dot x = u, \quad
+        x(0) = 3/2
+
+    Optimum: 15/136 = 0.1102941 exactly. The costate is constant, u = -5 x(10), so that
+    x(10) = 1.5/51, and the cost is 2.25 · 2.5/51. Costate 7.5/51. Problem: [Hull 2003].
+    """
+    model = _model()
+    return OCP(
+        name="integrator, priced end",
+        model=model,
+        x0=[1.5],
+        horizon=10.0,
+        running_cost=model.u**2 / 2,
+        terminal_cost=2.5 * model.x**2,
+    )
+
+
 def turnpike() -> OCP:
     r"""Stay near zero as long as possible: bang, singular, bang.
 

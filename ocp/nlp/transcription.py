@@ -91,6 +91,16 @@ class Transcription:
         """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
         return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])
 
+    def iterate(self, x: np.ndarray, u: np.ndarray, duration: float) -> np.ndarray:
+        """Return the vector of unknowns of a trajectory.
+
+        Args:
+            x: states at the nodes (N + 1, nx).
+            u: controls of the intervals (N, nu).
+            duration: final time minus t0 [s]; it counts where the final time is free.
+        """
+        return self.join(self.with_time(x, duration), u)
+
     def split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return z (N + 1, nz) and u (N, nu) of a vector of unknowns."""
         stages = w[: -self.nz].reshape(self.n, -1)

@@ -83,7 +83,7 @@ def grid_checks(solution: Solution, integrator: RK4 | None = None) -> tuple[Chec
 
 def _point(transcription: Transcription, solution: Solution) -> _Point:
     data = solution.data
-    w = transcription.join(transcription.with_time(solution.x, solution.duration), solution.u)
+    w = transcription.iterate(solution.x, solution.u, solution.duration)
     if not transcription.start_is_smooth(w, data):
         transcription = replace(transcription, start_as_data=True)
     p = transcription.data_vector(data)
@@ -131,7 +131,7 @@ def _sizes(transcription: Transcription, solution: Solution) -> tuple[np.ndarray
     x, u = (
         np.tile(size, (len(of), 1)) for size, of in ((sizes.x, solution.x), (sizes.u, solution.u))
     )
-    return transcription.join(transcription.with_time(x, solution.duration), u), sizes.cost
+    return transcription.iterate(x, u, solution.duration), sizes.cost
 
 
 def _lengths(rows: np.ndarray) -> np.ndarray:

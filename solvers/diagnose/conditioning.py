@@ -57,7 +57,7 @@ def conditioning(subject: DiagnosedProblem) -> Conditioning | None:
     tr, trial = subject.program.transcription, subject.trial
     if not trial.status.is_success or tr.size + len(tr.rows) > _LARGEST:
         return None
-    w = tr.join(tr.with_time(trial.x, trial.duration), trial.u)
+    w = tr.iterate(trial.x, trial.u, trial.duration)
     free = ~_active(w, *(tr.bounds(subject.data)[name] for name in ("lbx", "ubx")))
     matrix = _matrix(subject, w, free)
     if not free.any() or not np.isfinite(matrix).all():

@@ -4,19 +4,22 @@ import json
 
 import pytest
 
-from benchmarks.cases import LIBRARY, Case
+from benchmarks.cases import LIBRARY, PHASES, Case, PhasesCase
 from benchmarks.cases.library.certificates import COMMITTED, FORMAT, Certificates, committed
 from benchmarks.cases.library.entry import certified
 from solvers.certify.certify import OTHER_DIGITS, SMOOTH_DIGITS
 
 ENTRIES = committed().entries
-HOLDING = [case for case in LIBRARY if ENTRIES.get(case.name, {}).get("holds")]
+# Not certified yet; two families of points agree on it, see tests/phases/test_staged_ascent.py.
+UNCERTIFIED = {"staged-ascent"}
+ALL = tuple(case for case in (*LIBRARY, *PHASES) if case.name not in UNCERTIFIED)
+HOLDING = [case for case in ALL if ENTRIES.get(case.name, {}).get("holds")]
 # Asked of a certificate beside a derivation.
 CLOSED_FORM = 1e-8
 
 
 def test_every_case_of_the_library_is_on_file():
-    assert {case.name for case in LIBRARY} == set(ENTRIES)
+    assert {case.name for case in ALL} == set(ENTRIES)
 
 
 def test_every_certificate_holds():
@@ -24,7 +27,7 @@ def test_every_certificate_holds():
 
 
 @pytest.mark.parametrize("case", HOLDING, ids=lambda case: case.name)
-def test_what_holds_has_its_digits(case: Case):
+def test_what_holds_has_its_digits(case: Case | PhasesCase):
     entry, reference = ENTRIES[case.name], case.reference
     assert reference is not None
     if reference.is_closed_form:
@@ -35,8 +38,8 @@ def test_what_holds_has_its_digits(case: Case):
     assert entry["digits"] >= (SMOOTH_DIGITS if smooth else OTHER_DIGITS)
 
 
-@pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
-def test_reference_and_certificate_agree(case: Case):
+@pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
+def test_reference_and_certificate_agree(case: Case | PhasesCase):
     """Within both error bars, and what an interior-point method leaves at many active bounds."""
     lower, upper = ENTRIES[case.name]["interval"]
     reference = case.reference

@@ -34,7 +34,7 @@ from solvers import Collocation, MultipleShooting
 ALIKE = 1e-6
 INTERVALS = 40
 # Costs of problems whose optimum is so flat that a solver stops anywhere near it.
-FLAT = {"fuller": 1e-4, "pendulum-minimum-time": 1e-3}
+FLAT = {"fuller": 1e-4, "pendulum-minimum-time": 1e-3, "mountain-car": 1e-3}
 
 Pose = Callable[[OCP], OCP | None]
 
@@ -196,10 +196,14 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
 _WEIGHT = 1e-3
 
 
+# What wanders for minutes where it starts without a guess of its own.
+WITH_A_GUESS = {"interceptor", "shuttle-reentry"}
+
+
 def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
     """Return a problem whose controls have rates, and the same with the rates as its controls."""
     m, box = ocp.model, ocp.control_bounds
-    if m.is_discrete or not m.nu or ocp.has_free_start or m.nz:
+    if m.is_discrete or not m.nu or ocp.has_free_start or ocp.rates or m.nz:
         return None
     r, last = ca.SX.sym("r", m.nu), box.clip(np.zeros(m.nu))
     posed = replace(ocp, rates=(Rate(m.u, weight=_WEIGHT),), last_input=last, guess=None)
@@ -221,9 +225,11 @@ def _in_rates(ocp: OCP) -> tuple[OCP, OCP] | None:
 @pytest.mark.over_library
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
+    if case.name in WITH_A_GUESS:
+        pytest.skip("without a guess it is not solved in reasonable time")
     both = _in_rates(case.build())
     if both is None:
-        pytest.skip("it has no control in continuous time, a free start, or algebraic variables")
+        pytest.skip("no control in continuous time, a free start, rates, or algebraic variables")
     posed, by_hand = both
     for solver in (MultipleShooting(INTERVALS), Collocation(16)):
         hand = solve(by_hand, solver)

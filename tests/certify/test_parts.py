@@ -7,7 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.cases import LIBRARY
-from models.textbook import beam, bryson_denham, double_integrator_energy, van_der_pol
+from models.textbook import (
+    beam,
+    bryson_denham,
+    car_minimum_time,
+    double_integrator_energy,
+    van_der_pol,
+)
 from ocp import (
     OCP,
     Box,
@@ -231,7 +237,9 @@ def test_a_bound_that_the_end_implies_does_not_spoil_the_last_costate():
 # -- conditions on a grid ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("build", [double_integrator_energy, bryson_denham, van_der_pol])
+@pytest.mark.parametrize(
+    "build", [double_integrator_energy, bryson_denham, van_der_pol, car_minimum_time]
+)
 def test_the_grid_conditions_hold_at_an_optimum(build):
     assert all(check.verdict is Verdict.HOLDS for check in grid_checks(direct(build())))
 

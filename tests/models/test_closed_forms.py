@@ -23,6 +23,10 @@ PUSH = (1.0 - 1.0 / np.sqrt(5.0)) / 2.0
 END = np.arctanh(1.0 / np.sqrt(3.0))
 LATE = np.log(E - 1.0)
 S = np.sqrt(2.0)
+PEAK = np.sqrt(np.tanh(4.0))
+K = 500.0 / np.sqrt(5000.0)
+SWITCH = K * np.arctanh(PEAK)
+ARC = (np.pi - np.arccos(1.0 / 7.0)) / 2.0
 
 
 def turn_round(t: float, wall: float) -> float:
@@ -57,6 +61,12 @@ CONTROLS: dict[str, tuple[Callable, float, Sequence[float]]] = {
     "exponential-fuel": (lambda t: float(t > LATE), 1.0, (LATE,)),
     "exponential-minimum-time": (lambda t: 1.0, np.log(2.0), ()),
     "linear-hypersensitive": (hyper, 40.0, (10.0, 30.0)),
+    "integrator-priced-end": (lambda t: -7.5 / 51.0, 10.0, ()),
+    "car-minimum-time": (
+        lambda t: 2500.0 if t < SWITCH else -2500.0, SWITCH + K * np.arctan(PEAK), (SWITCH,),
+    ),
+    "shortest-turn": (lambda t: 2.0 * (t < ARC), np.sqrt(12.0) + ARC, (ARC,)),
+    "dido": (lambda t: (0.5 - t) / np.sqrt(1.0 / 3.0 - (t - 0.5) ** 2), 1.0, ()),
 }  # fmt: skip
 
 
@@ -204,7 +214,47 @@ def tube(end: float) -> float:
                           options=options).fun)  # fmt: skip
 
 
+def meeting() -> float:
+    """Turn about (0, 2), then straight on to where the target is."""
+
+    def miss(z: np.ndarray) -> list[float]:
+        end, turn = z
+        straight = 2.0 * (end - turn)
+        east = -2.0 * np.sin(turn) - straight * np.cos(turn)
+        return [east - 3.0 - end, 2.0 * (1.0 - np.cos(turn)) + straight * np.sin(turn) - 2.0]
+
+    return float(roots_of(miss, [9.0, 3.2])[0])
+
+
+def landing() -> float:
+    alpha, c = 1.227 / 2.349, 2.349
+
+    def ends(z: np.ndarray) -> list[float]:
+        fall, brake = z
+        left = 1.0 - alpha * brake
+        speed = -0.783 - fall
+        height = 1.0 - 0.783 * fall - fall**2 / 2.0 + speed * brake - brake**2 / 2.0
+        height += c * (brake + left * np.log(left) / alpha)
+        return [speed - brake - c * np.log(left), height]
+
+    return alpha * float(roots_of(ends, [0.3, 1.1])[1]) - 1.0
+
+
+def crane() -> float:
+    """The Gramian of position, speed, angle, its rate and the acceleration, by one exponential."""
+    a, b = np.zeros((5, 5)), np.zeros((5, 1))
+    a[0, 1] = a[1, 4] = a[2, 3] = 1.0
+    a[3, 2], a[3, 4], b[4] = -9.81 / 10.0, -1.0 / 10.0, 1.0
+    flow = expm(9.0 * np.block([[-a, b @ b.T], [np.zeros((5, 5)), a.T]]))
+    gramian = (flow[5:, 5:].T @ flow[:5, 5:])[:4, :4]
+    far = np.array([10.0, 0.0, 0.0, 0.0])
+    return float(far @ np.linalg.solve(gramian, far))
+
+
 ROOTS: dict[str, Callable[[], float]] = {
+    "interceptor": meeting,
+    "moon-landing": landing,
+    "overhead-crane": crane,
     "catalyst-mixing": lambda: tube(1.0),
     "two-catalysts": lambda: tube(4.0),
     "brachistochrone": brachistochrone,

@@ -50,7 +50,10 @@ class Units:
             terminal_cost=anew(ocp.terminal_cost) * self.cost,
             control_bounds=_box(ocp.control_bounds, self.u),
             state_bounds=_box(ocp.state_bounds, self.x),
-            constraints=tuple(self._constraint(c, anew(c.expression)) for c in ocp.constraints),
+            constraints=tuple(
+                self._constraint(c, anew(c.expression) / (step if c.at == "integral" else 1.0))
+                for c in ocp.constraints
+            ),
             parameters=ocp.parameters,
             smoothness=ocp.smoothness,
             guess=self._guess(ocp.guess),

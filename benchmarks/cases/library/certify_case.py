@@ -1,7 +1,7 @@
 """How the certificate of a case is made."""
 
-from benchmarks.cases import Case
-from ocp import Solution, SolverError
+from benchmarks.cases import Case, PhasesCase
+from ocp import PhasesSolution, Solution, SolverError
 from solvers import Certificate, CertifyOptions, MultipleShooting, certify, multistart
 from solvers.internal import Check
 
@@ -13,7 +13,7 @@ _CLOSED_FORM_ERROR = 1e-8
 _INTERVALS, _BETWEEN = (75, 300), 0.1
 
 
-def certify_case(case: Case, effort: CertifyOptions) -> Certificate:
+def certify_case(case: Case | PhasesCase, effort: CertifyOptions) -> Certificate:
     """Certify the best optimum that a few direct starts find.
 
     The problem's own guess is the first of them. Where the case knows a closed form, that is a
@@ -32,7 +32,7 @@ def certify_case(case: Case, effort: CertifyOptions) -> Certificate:
     return certificate.beside(Check.at_most(CLOSED_FORM, apart, _CLOSED_FORM_ERROR, said))
 
 
-def _best_start(case: Case, effort: CertifyOptions) -> Solution:
+def _best_start(case: Case | PhasesCase, effort: CertifyOptions) -> Solution | PhasesSolution:
     ocp = case.build()
     for intervals in _INTERVALS:
         solver = MultipleShooting(intervals)

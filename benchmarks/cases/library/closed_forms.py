@@ -27,6 +27,7 @@ from models.textbook import (
     exponential_minimum_time,
     integrator_free_time,
     integrator_free_time_quadratic,
+    integrator_priced_end,
     linear_hypersensitive,
     mixed_constraint,
     moving_floor,
@@ -126,6 +127,15 @@ CLOSED_FORMS = (
         "smooth",
         _MADE,
         costate0=(-np.sqrt(2.0),),
+    ),
+    entry(
+        integrator_priced_end,
+        "integrator-priced-end",
+        closed(15.0 / 136.0, "15/136: u is constant"),
+        FREE_END,
+        "easy",
+        "[Hull 2003]",
+        costate0=(7.5 / 51.0,),
     ),
     entry(
         turnpike,

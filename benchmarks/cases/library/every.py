@@ -3,8 +3,10 @@
 from benchmarks.cases.case import Case
 from benchmarks.cases.library.chapter_2 import CHAPTER_2
 from benchmarks.cases.library.closed_forms import CLOSED_FORMS
+from benchmarks.cases.library.cycles_and_budgets import CYCLES_AND_BUDGETS
 from benchmarks.cases.library.economics import ECONOMICS
 from benchmarks.cases.library.estimation import ESTIMATION
+from benchmarks.cases.library.flight import FLIGHT
 from benchmarks.cases.library.life import LIFE
 from benchmarks.cases.library.min_max import MIN_MAX
 from benchmarks.cases.library.processes import PROCESSES
@@ -12,6 +14,7 @@ from benchmarks.cases.library.robots import ROBOTS
 from benchmarks.cases.library.smooth import SMOOTH_PROBLEMS
 from benchmarks.cases.library.state_constraints import STATE_CONSTRAINTS
 from benchmarks.cases.library.switching import SWITCHING
+from benchmarks.cases.library.vehicles import VEHICLES
 
 LIBRARY: tuple[Case, ...] = (
     *CLOSED_FORMS,
@@ -24,6 +27,9 @@ LIBRARY: tuple[Case, ...] = (
     *PROCESSES,
     *ESTIMATION,
     *ROBOTS,
+    *VEHICLES,
+    *FLIGHT,
+    *CYCLES_AND_BUDGETS,
     *CHAPTER_2,
 )
 

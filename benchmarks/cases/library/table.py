@@ -1,6 +1,8 @@
 """The library as a table of Markdown: ``docs/library.md`` holds it, a test keeps it true."""
 
-from benchmarks.cases import LIBRARY, Case, Reference
+from collections.abc import Iterable
+
+from benchmarks.cases import LIBRARY, PHASES, KnownOptimum, Reference
 
 _HEAD = (
     "| case | difficulty | optimal cost | how | methods | published (error) |",
@@ -10,10 +12,19 @@ _HEAD = (
 
 def library_table() -> str:
     """Return a line for each case, in the order of the library."""
-    return "\n".join((*_HEAD, *map(_line, LIBRARY)))
+    return _table(LIBRARY)
 
 
-def _line(case: Case) -> str:
+def phases_table() -> str:
+    """Return the same of the problems in phases."""
+    return _table(PHASES)
+
+
+def _table(cases: Iterable[KnownOptimum]) -> str:
+    return "\n".join((*_HEAD, *map(_line, cases)))
+
+
+def _line(case: KnownOptimum) -> str:
     published = "; ".join(
         f"{p.value:.10g}, {p.source} ({error:+.1e})"
         for p, error in zip(case.published, case.errors(), strict=True)
