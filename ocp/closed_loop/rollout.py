@@ -1,23 +1,25 @@
 """The record of a closed loop."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ocp.checks.arguments import check_instance
+from ocp.checks.arguments import check_instance, check_whole
 from ocp.checks.errors import ProblemError, SolverError
 from ocp.closed_loop.decision import Decision, InputSource
 from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.loop_plotting.loop_record import Draw, Progress
+from ocp.plotting.compare import compared
+from ocp.plotting.view import View
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.ocp import OCP
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from ocp.plotting.picture import Picture
 
 # A loop that takes more of its steps from the rungs without a good plan lives on them.
 _TOLERATED = 0.05
@@ -122,11 +124,46 @@ class Rollout:
             raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}", self)
         return self
 
-    def plot(self) -> "Figure":
-        """Return a figure of states, inputs, their sources and cost over time."""
+    def plot(
+        self,
+        variables: Sequence[str] = (),
+        *,
+        compare: "Rollout | Mapping[str, Rollout] | None" = None,
+        time_unit: str = "s",
+        constraints: str = "active",
+        plans: int = 0,
+        plane: Sequence[str] | None = None,
+        against: str = "time",
+    ) -> "Picture":
+        """Return a picture: a panel for each state and input, and the running cost.
+
+        True states are lines, what the controller was told are circles, references of its cost
+        are dotted, limits of the plant are hatched; where the input does not come from an optimal
+        plan the background is coloured.
+
+        Args:
+            variables: names of what is drawn, in this order; ``"running cost"`` is one. Empty:
+                everything.
+            compare: another rollout, or several by name: ``{"no backup": other}``.
+            time_unit: ``"ms"``, ``"s"``, ``"min"``, ``"h"`` or ``"d"``.
+            constraints: which path constraints have a panel: the ``"active"`` ones, ``"all"`` or
+                ``"none"``.
+            plans: every how many steps the plan ahead is drawn; 0: no plan. A rollout that was
+                loaded has none.
+            plane: two names ``(x, y)``: one picture of y over x instead.
+            against: name of what is on the horizontal axis.
+
+        Returns:
+            a matplotlib ``Figure``; ``picture["speed"]`` are the axes that show the speed.
+
+        Raises:
+            ProblemError: if the loop has no step, a name is of nothing, or a unit is none.
+        """
         from ocp.loop_plotting.rollout import plot_rollout  # matplotlib takes a second
 
-        return plot_rollout(self)
+        view = View(variables, against, time_unit, constraints)
+        check_whole(plans, "plot: plans", least=0)
+        return plot_rollout(compared(self, compare, Rollout, "a Rollout"), view, plane, plans)
 
     def animate(
         self,

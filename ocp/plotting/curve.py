@@ -22,6 +22,8 @@ Role = Literal[
 
 # A limit is touched if the curve comes closer than this part of its span.
 _TOUCHED = 1e-3
+# What was measured or planned is drawn if it is no farther from everything else, in spans.
+_STRAYS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,15 @@ class Limit:
     def is_there(self) -> bool:
         """Whether it limits anything."""
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+    @property
+    def summary(self) -> tuple[float, ...]:
+        """What tells limits apart: each end at both ends of the curve, and its mean."""
+        found: list[float] = []
+        for end in (self.lower, self.upper):
+            mean = float(np.where(np.isfinite(end), end, 0.0).mean())
+            found += [float(end[0]), float(end[-1]), round(mean, 9)]
+        return tuple(found)
 
     @property
     def is_equation(self) -> bool:
@@ -84,11 +95,19 @@ class Points:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A second line beside a curve, such as its reference or an estimate of it."""
+    """A second line beside a curve.
+
+    Attributes:
+        name: of it.
+        t: instants [s], (K,).
+        values: (K,); NaN where there is none.
+        kind: what the curve should follow, what was told of it, or what was planned.
+    """
 
     name: str
     t: np.ndarray
     values: np.ndarray
+    kind: Literal["reference", "measured", "plan"] = "reference"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +121,7 @@ class Curve:
         t: instants [s], (K,).
         values: (K,).
         limits: of it.
-        references: what it should follow.
+        lines: what it should follow, and others beside it.
         points: at instants.
         is_sampled: whether it has values at its instants alone, as a discrete-time state.
     """
@@ -113,7 +132,7 @@ class Curve:
     t: np.ndarray
     values: np.ndarray
     limits: tuple[Limit, ...] = ()
-    references: tuple[Line, ...] = ()
+    lines: tuple[Line, ...] = ()
     points: tuple[Points, ...] = ()
     is_sampled: bool = False
 
@@ -123,16 +142,22 @@ class Curve:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
+    def beside(self) -> bool:
+        """Whether anything is drawn beside it."""
+        return bool(self.lines or self.points)
+
+    @property
     def extent(self) -> tuple[float, float]:
-        """Smallest and largest value of everything but the limits."""
-        parts = [
-            self.values,
-            *(r.values for r in self.references),
-            *(p.extent for p in self.points),
-        ]
-        values = np.concatenate(parts)
-        values = values[np.isfinite(values)]
-        return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+        """Smallest and largest value of everything but the limits.
+
+        What was measured or planned counts as far as it is near: a broken sensor hides no curve.
+        """
+        exact = [x.values for x in self.lines if x.kind == "reference"]
+        low, high = _range([self.values, *exact, *(p.extent for p in self.points)])
+        reach = _STRAYS * (high - low)
+        told = [x.values for x in self.lines if x.kind != "reference"]
+        near = [v[(v >= low - reach) & (v <= high + reach)] for v in told]
+        return _range([np.array([low, high]), *near])
 
     @property
     def touches_limit(self) -> bool:
@@ -152,7 +177,7 @@ def one_after_another(parts: Sequence[Curve]) -> Curve:
         t=_with_gaps([part.t for part in parts]),
         values=_with_gaps([part.values for part in parts]),
         limits=tuple(_joined_limit(name, parts) for name in limits),
-        references=tuple(r for part in parts for r in part.references),
+        lines=tuple(line for part in parts for line in part.lines),
         points=tuple(p for part in parts for p in part.points),
     )
 
@@ -167,6 +192,12 @@ def _joined_limit(name: str, parts: Sequence[Curve]) -> Limit:
 def _no_limit(part: Curve) -> Limit:
     ends = np.full(len(part.t), np.inf)
     return Limit("", -ends, ends)
+
+
+def _range(values: Sequence[np.ndarray]) -> tuple[float, float]:
+    rows = np.concatenate(values)
+    rows = rows[np.isfinite(rows)]
+    return (float(rows.min()), float(rows.max())) if rows.size else (0.0, 0.0)
 
 
 def _with_gaps(rows: Sequence[np.ndarray]) -> np.ndarray:

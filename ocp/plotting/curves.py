@@ -28,12 +28,30 @@ def curves_of(solution: PlottableSolution) -> tuple[Curve, ...]:
     others = [*additions.paths(), *additions.at_instants(), *additions.measured()]
     signals = list(additions.signals())
     additions.ends()
-    found = [*_variables(way, additions), *_rates(way, solution), *signals, *others]
-    found += _own(way, "invariant", way.ocp.invariants)
-    t = way.t
-    for name, row in zip(way.ocp.model.x_names, solution.costate_at(t).T, strict=True):
-        found.append(Curve(f"∂J/∂({name})", "", "costate", t, row))
-    return tuple(found)
+    rates = _rates(way, solution.data.values.named("last_input"))
+    invariants = _own(way, "invariant", way.ocp.invariants)
+    costates = zip(way.ocp.model.x_names, solution.costate_at(way.t).T, strict=True)
+    return (
+        *_variables(way, additions),
+        *rates,
+        *signals,
+        *others,
+        *invariants,
+        *(Curve(f"∂J/∂({name})", "", "costate", way.t, row) for name, row in costates),
+    )
+
+
+def curves_along(way: Trajectory) -> tuple[Curve, ...]:
+    """Return the curves of what acted on a plant: what is said of a whole trajectory is left out.
+
+    Args:
+        way: with inputs that are held from one instant to the next.
+    """
+    additions = _Additions(way)
+    others, signals = list(additions.paths()), list(additions.signals())
+    rates = _rates(way, None, is_held=True)
+    invariants = _own(way, "invariant", way.ocp.invariants)
+    return (*_variables(way, additions), *rates, *signals, *others, *invariants)
 
 
 def _variables(way: Trajectory, additions: "_Additions") -> Iterator[Curve]:
@@ -56,7 +74,7 @@ def _variables(way: Trajectory, additions: "_Additions") -> Iterator[Curve]:
                     way.t,
                     values[:, i],
                     (*own, *additions.limits.get(k, ())),
-                    tuple(additions.references.get(k, ())),
+                    tuple(additions.lines.get(k, ())),
                     tuple(additions.points.get(k, ())),
                     is_sampled=m.is_discrete and role == "state",
                 )
@@ -66,21 +84,24 @@ def _variables(way: Trajectory, additions: "_Additions") -> Iterator[Curve]:
         yield from found.get(role, [])
 
 
-def _rates(way: Trajectory, solution: PlottableSolution) -> Iterator[Curve]:
-    """Yield the rates of the controls that have bounds or prices of them, as steps."""
+def _rates(way: Trajectory, last: np.ndarray | None, *, is_held: bool = False) -> Iterator[Curve]:
+    """Yield the rates of the controls that have bounds or prices of them, as steps.
+
+    Args:
+        way: along which.
+        last: the controls with a rate just before the start; None: what they are at first.
+        is_held: whether a control that jumps counts as if it moved in the interval behind.
+    """
     ocp = way.ocp
     m, rates, t = ocp.model, ocp.control_rates, way.t
-    last = solution.data.values.named("last_input")
+    lengths = np.ones(len(t) // 2) if m.is_discrete else np.diff(t)[::2]
     for k, i in enumerate(rates.index):
         u, unit = way.u[:, i], m.u_units[i] if m.u_units else ""
-        if m.is_discrete:
-            steps = np.diff(u[::2], prepend=u[0] if last is None else last[k])
-            values, unit = np.repeat(steps, 2), f"{unit}/step" if unit else ""
-        else:
-            values, unit = (
-                np.repeat(np.diff(u)[::2] / np.diff(t)[::2], 2),
-                f"{unit}/s" if unit else "",
-            )
+        changes = np.diff(u)[::2]
+        if m.is_discrete or is_held:
+            changes = np.diff(u[::2], prepend=u[0] if last is None else last[k])
+        unit = f"{unit}/{'step' if m.is_discrete else 's'}" if unit else ""
+        values = np.repeat(changes / lengths, 2)
         limit = _limit("bounds", _row(rates.box, k), len(t))
         yield Curve(rates.names[k], unit, "rate", t, values, limit)
 
@@ -100,7 +121,7 @@ class _Additions:
 
     way: Trajectory
     limits: dict[int, list[Limit]] = field(default_factory=dict)
-    references: dict[int, list[Line]] = field(default_factory=dict)
+    lines: dict[int, list[Line]] = field(default_factory=dict)
     points: dict[int, list[Points]] = field(default_factory=dict)
 
     @property
@@ -132,7 +153,7 @@ class _Additions:
         way, references, first = self.way, references_of(self.way), 0
         for place, (name, owner) in references.items():
             line = Line(name, way.t, way.p[:, place])
-            self.references.setdefault(owner, []).append(line)
+            self.lines.setdefault(owner, []).append(line)
         for entry in self.ocp.entries:
             size = entry.symbol.numel()
             if isinstance(entry, Signal):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from ocp.plotting.curve import Curve, Limit, Points
+from ocp.plotting.curve import Curve, Limit, Line, Points
 from ocp.plotting.picture import finite_range
 from ocp.plotting.view import Abscissa
 
@@ -53,25 +53,40 @@ def draw_panel(axes: Axes, drawn: Sequence[Drawn]) -> None:
     axes.set_ylim(low - margin, high + margin)
     for d in drawn:
         _draw_curve(axes, d)
-    _draw_limits(axes, limits, near, several=len({d.curve.name for d in drawn}) > 1)
+    _draw_limits(axes, limits, near)
 
 
 def _draw_curve(axes: Axes, d: Drawn) -> None:
     curve, place = d.curve, d.abscissa
-    for line in curve.references:
-        axes.plot(
-            place.at(line.t), line.values, color="black", linestyle=(0, (1, 1.2)),
-            linewidth=1.3, label=f"reference: {line.name}", zorder=2.2,
-        )  # fmt: skip
+    for line in curve.lines:
+        _draw_line(axes, place, line, d.colour)
     style = {"color": d.colour, "linestyle": d.line, "linewidth": 1.5, "zorder": 2.5}
     axes.plot(place.at(curve.t), curve.values, label=d.label, **style)
     if curve.is_sampled and len(curve.t) <= 160:
         axes.plot(place.at(curve.t), curve.values, ".", color=d.colour, markersize=5)
     for points in curve.points:
-        _draw_points(axes, place, points, d.colour)
+        _draw_points(axes, place, points)
 
 
-def _draw_points(axes: Axes, place: Abscissa, points: Points, colour: str) -> None:
+def _draw_line(axes: Axes, place: Abscissa, line: Line, colour: str) -> None:
+    x = place.at(line.t)
+    if line.kind == "reference":
+        axes.plot(x, line.values, color="black", linestyle=(0, (1, 1.2)), linewidth=1.3,
+                  label=f"reference: {line.name}", zorder=2.8)  # fmt: skip
+    elif line.kind == "plan":
+        axes.plot(x, line.values, color=colour, linestyle=(0, (4, 2)), linewidth=0.8, alpha=0.6,
+                  label=line.name, zorder=2.1)  # fmt: skip
+    else:
+        bottom, top = axes.get_ylim()
+        outside = int(((line.values < bottom) | (line.values > top)).sum())
+        missing = int(np.isnan(line.values).sum())
+        notes = [f"{n} {what}" for n, what in ((outside, "off scale"), (missing, "missing")) if n]
+        said = f"{line.name} ({', '.join(notes)})" if notes else line.name
+        axes.plot(x, line.values, linestyle="none", marker="o", markersize=2.6, color="0.35",
+                  markerfacecolor="none", markeredgewidth=0.6, label=said, zorder=2.0)  # fmt: skip
+
+
+def _draw_points(axes: Axes, place: Abscissa, points: Points) -> None:
     """Draw what was measured with its error, and what is wanted with what is allowed."""
     x, y = place.at(points.t), points.values
     below, above = y - points.lower, points.upper - y
@@ -116,50 +131,40 @@ def _ends_near(limit: Limit, low: float, high: float, span: float) -> list[np.nd
 
 
 def _draw_limits(
-    axes: Axes,
-    limits: Sequence[tuple[Drawn, Limit]],
-    near: Sequence[list[np.ndarray]],
-    *,
-    several: bool,
+    axes: Axes, limits: Sequence[tuple[Drawn, Limit]], near: Sequence[list[np.ndarray]]
 ) -> None:
-    """Draw limits once each: grey and hatched, or in the colour of one of several curves."""
-    same = _all_alike(limits)
+    """Draw limits once each: grey and hatched, or in the colours of runs where they differ."""
+    by_run: dict[str, set[tuple[float, ...]]] = {}
+    for d, limit in limits:
+        by_run.setdefault(d.colour, set()).add(limit.summary)
+    same = len({frozenset(found) for found in by_run.values()}) <= 1
     done: set[tuple[tuple[float, ...], str]] = set()
     for (d, limit), ends in zip(limits, near, strict=True):
-        signature = (_summary(limit), d.curve.name if several and not same else "")
-        if signature in done:
-            continue
-        done.add(signature)
-        colour = d.colour if several and not same else _GREY
-        x, bottom_top = d.abscissa.at(d.curve.t), axes.get_ylim()
-        beyond = 20.0 * (bottom_top[1] - bottom_top[0])
-        for end, shown, sign in zip((limit.lower, limit.upper), ends, (-1, 1), strict=True):
-            if shown.size:
-                label = f"{d.curve.name}: {limit.name}" if several and not same else limit.name
-                _draw_end(axes, x, end, sign * beyond, limit, colour, label,
-                          hatched=d.abscissa.is_time and colour == _GREY)  # fmt: skip
-            elif np.isfinite(end).any():
-                _name_end(axes, end, sign, d.curve.name if several and not same else "")
+        x, (bottom, top) = d.abscissa.at(d.curve.t), axes.get_ylim()
         if limit.is_soft:
             _draw_slack(axes, x, d.curve.values, limit)
+        colour = _GREY if same else d.colour
+        if (limit.summary, colour) in done:
+            continue
+        done.add((limit.summary, colour))
+        hatched = same and d.abscissa.is_time
+        for end, shown, sign in zip((limit.lower, limit.upper), ends, (-1, 1), strict=True):
+            if shown.size:
+                beyond = sign * 20.0 * (top - bottom)
+                _draw_end(axes, x, end, beyond if hatched else 0.0, limit, colour)
+            elif np.isfinite(end).any():
+                _name_end(axes, end, sign)
 
 
 def _draw_end(
-    axes: Axes,
-    x: np.ndarray,
-    end: np.ndarray,
-    beyond: float,
-    limit: Limit,
-    colour: str,
-    label: str,
-    *,
-    hatched: bool,
+    axes: Axes, x: np.ndarray, end: np.ndarray, beyond: float, limit: Limit, colour: str
 ) -> None:
+    """Draw one end of a limit, and hatch what is beyond it, that far."""
     end = np.where(np.isfinite(end), end, np.nan)
     style = (0, (5, 2)) if limit.is_soft else "-"
-    said = f"{label} (soft)" if limit.is_soft else label
+    said = f"{limit.name} (soft)" if limit.is_soft else limit.name
     axes.plot(x, end, color=colour, linestyle=style, linewidth=0.9, label=said, zorder=2.0)
-    if hatched:
+    if beyond:
         axes.fill_between(
             x, end, end + beyond, facecolor="none", edgecolor="0.78", hatch="////",
             linewidth=0.0, zorder=0.6,
@@ -174,25 +179,9 @@ def _draw_slack(axes: Axes, x: np.ndarray, values: np.ndarray, limit: Limit) -> 
                           label="slack in use")  # fmt: skip
 
 
-def _name_end(axes: Axes, end: np.ndarray, sign: int, owner: str) -> None:
+def _name_end(axes: Axes, end: np.ndarray, sign: int) -> None:
     """Say in the legend where a limit is that is off the scale."""
     values = end[np.isfinite(end)]
     value = values.min() if sign > 0 else values.max()
-    text = f"{owner} {'≤' if sign > 0 else '≥'} {value:.4g}".strip()
-    axes.plot([], [], linestyle="none", label=f"{text} (off scale)")
-
-
-def _summary(limit: Limit) -> tuple[float, ...]:
-    """What tells limits apart: each end at both ends of the curve, and its mean."""
-    found: list[float] = []
-    for end in (limit.lower, limit.upper):
-        mean = float(np.where(np.isfinite(end), end, 0.0).mean())
-        found += [float(end[0]), float(end[-1]), round(mean, 9)]
-    return tuple(found)
-
-
-def _all_alike(limits: Sequence[tuple[Drawn, Limit]]) -> bool:
-    by_curve: dict[str, set[tuple[float, ...]]] = {}
-    for d, limit in limits:
-        by_curve.setdefault(d.curve.name, set()).add(_summary(limit))
-    return len({frozenset(found) for found in by_curve.values()}) <= 1
+    label = f"{'≤' if sign > 0 else '≥'} {value:.4g} (off scale)"
+    axes.plot([], [], linestyle="none", label=label)

@@ -1,4 +1,4 @@
-"""Which curves share a panel: those of one kind and unit, whose sizes are alike."""
+"""Which curves share a panel: of one kind and unit, of like size and the same limits."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,10 +36,9 @@ class Panel:
         """Whether a curve can be read beside those that are there."""
         first = self.curves[0]
         alike = curve.unit and (curve.role, curve.unit) == (first.role, first.unit)
-        own = curve.references or curve.points
-        if not alike or own or first.references or first.points:
+        if not alike or len(self.curves) >= _MOST_LINES or curve.beside or first.beside:
             return False
-        if len(self.curves) >= _MOST_LINES:
+        if {x.summary for x in curve.limits} != {x.summary for x in first.limits}:
             return False
         ends = [c.extent for c in (*self.curves, curve)]
         low, high = min(e[0] for e in ends), max(e[1] for e in ends)

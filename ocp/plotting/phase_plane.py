@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 
 from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
-from ocp.plotting.picture import COLOURS, Picture, finite_range, legend
+from ocp.plotting.picture import COLOURS, Picture, finite_range, legend, write_title
 from ocp.plotting.run import Run
 from ocp.plotting.solution import styles
 from ocp.plotting.view import named
 
-_MARGIN, _NEAR = 0.08, 0.5
+_MARGIN, _NEAR, _SAME = 0.08, 0.5, 1e-9
 
 
 def plot_plane(
@@ -47,7 +47,7 @@ def plot_plane(
         ax.set_aspect("equal", adjustable="box")
     ax.grid(alpha=0.25, linewidth=0.6)
     legend(ax)
-    picture.suptitle(title, fontsize="large", color="black" if is_success else "#B03A00")
+    write_title(picture, title, is_good=is_success)
     picture.show_in(ax, plane)
     return picture
 
@@ -60,7 +60,9 @@ def _limit(ax: Axes, axis: str, curve: Curve, all_runs: Sequence[Curve]) -> None
     near = {
         float(end[0]): name
         for name, end in ends
-        if np.isfinite(end).all() and np.ptp(end) == 0.0 and low - reach <= end[0] <= high + reach
+        if np.isfinite(end).all()
+        and np.ptp(end) <= _SAME * abs(end[0])
+        and low - reach <= end[0] <= high + reach
     }
     low, high = min([low, *near]), max([high, *near])
     margin = _MARGIN * (high - low) or 1.0

@@ -16,6 +16,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _ONE_COLUMN, _TWO_COLUMNS = 6, 16
 _WIDTHS = {1: 8.0, 2: 13.0, 3: 18.0}
 _LINE = 18
+# Width of a letter of the title [pt].
+_TITLE_LETTER = 7.0
 
 
 class Picture(Figure):
@@ -87,6 +89,13 @@ def name_axis(axes: Sequence[Axes], label: str) -> None:
     rows = axes[0].get_gridspec().nrows  # type: ignore[union-attr]
     for ax in {*axes[rows - 1 :: rows], axes[-1]}:
         ax.set_xlabel(label)
+
+
+def write_title(picture: Picture, title: str, *, is_good: bool) -> None:
+    """Write a title as wide as the picture is; in red where something went wrong."""
+    width = int(72.0 * picture.get_size_inches()[0] / _TITLE_LETTER)
+    colour = "black" if is_good else "#B03A00"
+    picture.suptitle(wrapped(title, width), fontsize="large", color=colour)
 
 
 def legend(axes: Axes) -> None:

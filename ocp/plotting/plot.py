@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ocp.plotting.phase_plane import plot_plane
-from ocp.plotting.picture import Picture, wrapped
+from ocp.plotting.picture import Picture
 from ocp.plotting.plottable import Pictured
 from ocp.plotting.run import Run
 from ocp.plotting.solution import plot_runs
 from ocp.plotting.view import View
 
-_TITLE = 90
 # More unknown constants than so many are no title.
 _MOST_UNKNOWNS = 6
 
@@ -42,4 +41,4 @@ def _title(solutions: Mapping[str, Pictured]) -> str:
         said.append("; ".join(constants))
     if not first.status.is_success and first.message:
         said.append(first.message)
-    return "\n".join(wrapped(line, _TITLE) for line in (f"{first.name}: {said[0]}", *said[1:]))
+    return "\n".join((f"{first.name}: {said[0]}", *said[1:]))

@@ -65,10 +65,6 @@ class PlottableSolution(Protocol):
         """Costates at time(s) t [s]."""
         ...
 
-    def algebraic(self, t: ArrayLike) -> np.ndarray:
-        """Algebraic variables at time(s) t [s]."""
-        ...
-
 
 @dataclass(frozen=True, eq=False)
 class Pictured:

@@ -10,7 +10,7 @@ from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
 from ocp.plotting.draw_panel import SOLID, Dashes, Drawn, Style, draw_panel
 from ocp.plotting.panels import Panel, panels_of
-from ocp.plotting.picture import COLOURS, Picture, laid_out, legend, name_axis
+from ocp.plotting.picture import COLOURS, Picture, laid_out, legend, name_axis, write_title
 from ocp.plotting.run import Run
 from ocp.plotting.view import TIME_UNITS, Abscissa, View
 
@@ -53,7 +53,7 @@ def plot_runs(title: str, is_success: bool, runs: Mapping[str, Run], view: View)
     _finish(picture, axes, next(iter(places.values())))
     if view.against == "time":
         _mark_phases(axes, runs, TIME_UNITS[view.time_unit])
-    picture.suptitle(title, fontsize="large", color="black" if is_success else "#B03A00")
+    write_title(picture, title, is_good=is_success)
     if len(runs) > 1:
         _name_runs(picture, runs)
     return picture

@@ -24,7 +24,6 @@ class Trajectory:
         t: instants [s], each but the ends twice, (K,).
         x: states (K, nx).
         u: controls (K, nu), left and right of every instant.
-        z: algebraic variables (K, nz).
         p: parameters and signals (K, n_p), left and right.
     """
 
@@ -32,7 +31,6 @@ class Trajectory:
     t: np.ndarray
     x: np.ndarray
     u: np.ndarray
-    z: np.ndarray
     p: np.ndarray
 
     @classmethod
@@ -43,24 +41,21 @@ class Trajectory:
         is_continuous = solution.control_kind == "linear"
         before = instants - (0.0 if is_continuous else _BEFORE * solution.duration)
         before = np.maximum(before, solution.t[0])
-
-        def both(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-            rows = np.empty((2 * len(left), *left.shape[1:]))
-            rows[::2], rows[1::2] = left, right
-            return rows[1:-1]
-
-        x, z = solution.state(instants), np.empty((len(instants), 0))
-        z = (z, z)
-        if solution.problem.model.nz:
-            z = (solution.algebraic(before), solution.algebraic(instants))
         return cls(
             ocp=solution.problem,
-            t=both(instants, instants),
-            x=both(x, x),
-            u=both(solution.control(before), solution.control(instants)),
-            z=both(*z),
-            p=both(values.at(fractions, -1), values.at(fractions, 1)),
+            t=both_sides(instants, instants),
+            x=both_sides(*[solution.state(instants)] * 2),
+            u=both_sides(solution.control(before), solution.control(instants)),
+            p=both_sides(values.at(fractions, -1), values.at(fractions, 1)),
         )
+
+    @cached_property
+    def z(self) -> np.ndarray:
+        """Algebraic variables (K, nz), as the problem's own equations give them."""
+        if not self.ocp.model.nz:
+            return np.empty((len(self.t), 0))
+        function = self.ocp.functions.algebraic.map(len(self.t))
+        return np.array(function(self.x.T, self.u.T, self.t[None, :], self.p.T)).T
 
     @cached_property
     def variables(self) -> np.ndarray:
@@ -74,6 +69,13 @@ class Trajectory:
         given = (self.x, self.u, self.z, self.t[:, None], self.p)
         rows = np.array(function.map(len(self.t))(*[a.T for a in given]))
         return rows.T.reshape(len(self.t), expression.numel())
+
+
+def both_sides(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return rows just before and just after each instant in turn; of the ends one."""
+    rows = np.empty((2 * len(left), *left.shape[1:]))
+    rows[::2], rows[1::2] = left, right
+    return rows[1:-1]
 
 
 def drawn_instants(solution: PlottableSolution) -> np.ndarray:

@@ -113,7 +113,7 @@ def test_a_panel_a_variable_with_its_unit_limits_and_reference(cooled: Solution)
     assert legend(picture["concentration"]) == ["≥ 0 (off scale)", "≤ 1000 (off scale)"]
     warm = picture["temperature"]
     assert legend(warm) == [
-        "reference: wanted", "wanted: gate", "wanted: end", "warm (soft)", "slack in use"
+        "reference: wanted", "wanted: gate", "wanted: end", "slack in use", "warm (soft)"
     ]  # fmt: skip
     t, limit = line(warm, "warm (soft)")
     np.testing.assert_allclose(limit, 125.0)  # of 2 T it is 250
