@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_whole
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Decision, InputSource
 from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.loop_plotting.loop_record import Draw, Progress
@@ -43,6 +44,8 @@ class Rollout:
         violation: the plant's largest violation of a bound or constraint.
         worst: which, and the end of the sampling interval it happened in; empty where nothing is
             violated.
+        violations: the largest violation of every bound and constraint, when, and in which unit;
+            print it as a table.
         drift: largest violation of the plant's invariants at the sampling instants, such as
             the task error of an arm.
         step_times: time of each decision [s], (K,).
@@ -67,6 +70,7 @@ class Rollout:
     step_times: np.ndarray
     clipped: np.ndarray
     ended: str = ""
+    violations: ConstraintTable = field(default_factory=ConstraintTable)
     decisions: tuple[Decision, ...] = ()
     late: int = 0
 
@@ -217,6 +221,7 @@ class Rollout:
             "messages": np.array(self.messages, dtype=str),
             "plant": self.plant.name,
         }
+        content |= self.violations.entries()
         content |= fingerprint_entries(self.plant)
         return write_archive(path, "rollout", content)
 
@@ -252,6 +257,7 @@ class Rollout:
             plant=plant,
             **{name: np.asarray(data[name], dtype=float) for name in _ARRAYS},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            violations=ConstraintTable.of_entries(data),
             sources=tuple(InputSource[name] for name in names),
             messages=tuple(map(str, data["messages"])),
         )

@@ -188,6 +188,7 @@ class _Journal:
             messages=tuple(d.message for d in self.decisions),
             costs=np.array(self.costs),
             violation=self.violation,
+            violations=self.running.violations,
             worst=self.worst,
             drift=_drift(self.ocp, t, x),
             step_times=np.array([d.time_used for d in self.decisions]),

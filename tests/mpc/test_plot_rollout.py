@@ -27,7 +27,7 @@ DT, STEPS = 0.1, 12
 X, V, F, WANTED = (ca.SX.sym(name) for name in ("position", "speed", "force", "wanted"))
 
 
-def cart(mass: float = 1.0) -> OCP:
+def cart(mass: float = 1.0, fastest: float = 0.7) -> OCP:
     """A cart that follows a reference, and is neither too fast nor too strong."""
     model = Model(name="cart", x=ca.vertcat(X, V), u=F, f=ca.vertcat(V, F / mass),
                   x_units=("m", "m/s"), u_units=("N",))  # fmt: skip
@@ -38,7 +38,10 @@ def cart(mass: float = 1.0) -> OCP:
         horizon=1.0,
         running_cost=10 * (X - WANTED) ** 2 + V**2 + 0.1 * F**2,
         control_bounds=Box(-2.0, 2.0),
-        constraints=(Constraint("not too fast", V, -0.7, 0.7), Constraint("power", F * V, -9, 9)),
+        constraints=(
+            Constraint("not too fast", V, -fastest, fastest),
+            Constraint("power", F * V, -9, 9),
+        ),
         parameters=(Signal("wanted", WANTED, np.zeros(11)),),
     )
 
@@ -57,7 +60,7 @@ def broken(x: np.ndarray, t: float) -> np.ndarray:
 @pytest.fixture(scope="module")
 def faulty() -> Rollout:
     mpc = MPC(ocp=cart(), solver=MultipleShooting(10), dt=DT, compiled=False, parameters=ahead)
-    plant = Plant(ocp=cart(1.2), measurement_noise=[0.01, 0.02])
+    plant = Plant(ocp=cart(1.2, fastest=0.5), measurement_noise=[0.01, 0.02])
     return closed_loop(mpc, plant, [1.0, 0.0], STEPS * DT, dt=DT, sensors=broken)
 
 
@@ -124,3 +127,26 @@ def test_loops_are_compared_and_drawn_over_each_other(faulty: Rollout) -> None:
 def test_what_cannot_be_drawn_is_said(faulty: Rollout, options, said) -> None:
     with pytest.raises(ProblemError, match=said):
         faulty.plot(**options)
+
+
+def test_a_table_says_for_each_constraint_how_much_and_when(
+    faulty: Rollout, tmp_path: Path
+) -> None:
+    table = faulty.violations
+    assert [row.name for row in table.rows] == ["bound of force", "not too fast", "power"]
+    fast = table["not too fast"]
+    assert (fast.amount, fast.unit) == (pytest.approx(faulty.violation), "m/s")
+    assert f"{fast.amount:.3g} at t = {fast.t:.4g} s" in faulty.worst
+    assert str(table["power"]) == "power: kept"
+    assert str(table).splitlines()[0].split() == [
+        "constraint",
+        "largest",
+        "violation",
+        "when",
+        "[s]",
+    ]
+    assert "m/s" in str(table).splitlines()[2]
+    with pytest.raises(KeyError, match="they are bound of force, not too fast, power"):
+        table["thrust"]
+    loaded = Rollout.load(faulty.save(tmp_path / "loop"), faulty.plant)
+    assert loaded.violations == table
