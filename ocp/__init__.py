@@ -1,6 +1,7 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
 from ocp.checks.errors import DamagedFile, OCPError, ProblemError, SolverError, UnsupportedProblem
+from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Controller, ControlRefused, Decision, InputSource, StepReport
 from ocp.closed_loop.feedback_law import FeedbackLaw
 from ocp.closed_loop.plant import Plant
@@ -53,6 +54,7 @@ __all__ = [
     "Box",
     "Compiler",
     "Constraint",
+    "ConstraintTable",
     "ControlRefused",
     "Controller",
     "DamagedFile",

@@ -9,6 +9,7 @@ from benchmarks.commands.listing import LIST
 from benchmarks.commands.loops import FAULTS, FOLLOWED, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
 from benchmarks.commands.peers import PEERS_COMMAND
+from benchmarks.commands.pictures import PICTURES
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
@@ -32,6 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     FOLLOWED,
     MISTAKES_COMMAND,
     PEERS_COMMAND,
+    PICTURES,
     ROOMS,
 )
 

@@ -66,10 +66,11 @@ def _limit(ax: Axes, axis: str, curve: Curve, all_runs: Sequence[Curve]) -> None
     }
     low, high = min([low, *near]), max([high, *near])
     margin = _MARGIN * (high - low) or 1.0
-    (ax.set_xlim if axis == "x" else ax.set_ylim)(low - margin, high + margin)
+    low, high = low - margin, high + margin
+    (ax.set_xlim if axis == "x" else ax.set_ylim)(low, high)
     line, span = (ax.axvline, ax.axvspan) if axis == "x" else (ax.axhline, ax.axhspan)
     middle = float(np.nanmean(curve.values))
     for end, name in near.items():
-        outside = end + (margin if end >= middle else -margin) * 1.01
+        outside = high + margin if end >= middle else low - margin
         line(end, color="0.35", linewidth=0.9, label=name)
         span(*sorted((end, outside)), facecolor="none", edgecolor="0.78", hatch="////", zorder=0.6)
