@@ -12,6 +12,7 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.interrupts import interruptible
+from ocp.checks.rich_text import html_of
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
@@ -130,6 +131,7 @@ __all__ = [
     "elevated",
     "epigraph",
     "hamiltonian",
+    "html_of",
     "interpolate",
     "interruptible",
     "judged",

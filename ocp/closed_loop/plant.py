@@ -58,6 +58,19 @@ class Plant:
     parameters: Callable[[float], Mapping[str, ArrayLike]] | None = None
     jitter: float = 0.0
 
+    def __repr__(self) -> str:
+        """Return one line: what it is, and how it differs from its problem."""
+        faults = [
+            (np.any(self.process_noise), "process noise"),
+            (np.any(self.measurement_noise), "measurement noise"),
+            (self.disturbance is not None, "disturbance"),
+            (self.lag, f"lag {self.lag:g} s"),
+            (self.jitter, f"jitter {self.jitter:g}"),
+            (self.parameters is not None, "parameters of its own"),
+        ]
+        said = ", ".join(what for there, what in faults if there)
+        return f"<Plant '{self.ocp.name}': {said or 'no fault'}>"
+
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_instance(self.ocp, OCP, "plant: ocp")

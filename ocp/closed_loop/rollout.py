@@ -10,6 +10,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_whole
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.checks.rich_text import html_of
 from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Decision, InputSource
 from ocp.files.archive import made_of, read_archive, write_archive
@@ -78,9 +79,20 @@ class Rollout:
         """Return one line: what was controlled, what it cost, and where the inputs came from."""
         return (
             f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
-            f"violation {self.violation:.2g}, {self.decided_by}>"
+            f"{self.worst or 'nothing violated'}, {self.decided_by}>"
             f"{chr(10) + self.advice if self.advice else ''}"
         )
+
+    def _repr_html_(self) -> str:
+        """Return the loop in numbers, and the table of its constraints, for a notebook."""
+        facts = [
+            ("closed-loop cost", f"{self.cost:.6g}"),
+            ("largest violation", self.worst or "none"),
+            ("inputs", self.decided_by),
+            ("slowest decision [s]", f"{self.step_times.max(initial=0.0):.3g}"),
+        ]
+        facts += [("advice", self.advice)] if self.advice else []
+        return html_of(f"Loop with {self.plant.name}", str(self.violations), facts)
 
     @property
     def advice(self) -> str:

@@ -133,6 +133,13 @@ class MPC:
     # The thread that is inside a step.
     _inside: int | None = field(default=None, init=False, repr=False)
 
+    def __repr__(self) -> str:
+        """Return one line: of what, by what, and how often."""
+        late = f", delay {self.delay:g} s" if self.delay else ""
+        return (
+            f"<MPC of '{self.ocp.name}' by {type(self.solver).__name__}, dt = {self.dt:g} s{late}>"
+        )
+
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
         self._check()

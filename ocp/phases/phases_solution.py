@@ -10,6 +10,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import SolverError
+from ocp.checks.rich_text import html_of
 from ocp.phases.chain import Chain
 from ocp.phases.phases_evaluation import PhasesEvaluation, evaluate_phases
 from ocp.phases.side_by_side import SideBySide, side_by_side
@@ -131,6 +132,18 @@ class PhasesSolution(CompositeSolution[PhasesEvaluation]):
             f"<Solution of '{self.problem.name}' ({said}): {self.status.name}, "
             f"cost {self.cost:.6g}, {self.iterations} iterations>"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what was found in numbers, for a notebook."""
+        each = zip(self.problem.names, self.durations, strict=True)
+        facts = [
+            ("status", self.status.words),
+            ("message", self.message or "-"),
+            ("cost, the solver's own", f"{self.cost:.9g}"),
+            *((f"duration of {name} [s]", f"{duration:.6g}") for name, duration in each),
+            ("solver", self.solver),
+        ]
+        return html_of(f"Solution of {self.problem.name}", facts=facts)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is copied and pickled: the fields."""

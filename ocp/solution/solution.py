@@ -12,6 +12,7 @@ from scipy.interpolate import PPoly
 
 from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.checks.rich_text import html_of
 from ocp.files.archive import made_of, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.normal_form.normal_form import NormalForm, normal_form
@@ -147,6 +148,23 @@ class Solution:
             f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
             f"{self.iterations} iterations, {len(self.t) - 1} intervals{self._hint}>"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what was found in numbers, for a notebook."""
+        constants = [
+            (name, np.array2string(np.asarray(v), precision=6)) for name, v in self.unknowns.items()
+        ]
+        facts = [
+            ("status", self.status.words),
+            ("message", self.message or "-"),
+            ("cost, the solver's own", f"{self.cost:.9g}"),
+            ("duration [s]", f"{self.duration:.6g}"),
+            *constants,
+            ("solver", self.solver),
+            ("iterations, intervals", f"{self.iterations}, {len(self.t) - 1}"),
+            ("time to build and solve [s]", f"{self.build_time:.3g}, {self.solve_time:.3g}"),
+        ]
+        return html_of(f"Solution of {self.problem.name}", facts=facts)
 
     @property
     def _hint(self) -> str:

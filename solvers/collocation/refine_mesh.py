@@ -72,6 +72,12 @@ class MeshRefinement:
     solution: Solution
     rounds: tuple[MeshRound, ...]
 
+    def __repr__(self) -> str:
+        """Return one line: how many rounds, and how far."""
+        error = f"{self.rounds[-1].error:.1e}" if self.rounds else "none"
+        status = self.solution.status.name
+        return f"<MeshRefinement: {len(self.rounds)} rounds, {status}, last error {error}>"
+
 
 def refine_mesh(
     start: Solution,
