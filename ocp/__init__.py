@@ -1,6 +1,7 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
 from ocp.checks.errors import DamagedFile, OCPError, ProblemError, SolverError, UnsupportedProblem
+from ocp.checks.progress import Interrupted, Progress, TextProgress
 from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Controller, ControlRefused, Decision, InputSource, StepReport
 from ocp.closed_loop.feedback_law import FeedbackLaw
@@ -72,6 +73,7 @@ __all__ = [
     "InputSource",
     "Integrator",
     "InterpretedWarning",
+    "Interrupted",
     "Link",
     "Measurement",
     "Midpoint",
@@ -89,6 +91,7 @@ __all__ = [
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Progress",
     "Radau",
     "Rate",
     "Record",
@@ -102,6 +105,7 @@ __all__ = [
     "Status",
     "StepReport",
     "Table",
+    "TextProgress",
     "Unknown",
     "UnsupportedProblem",
     "Work",

@@ -12,6 +12,7 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.interrupts import interruptible
+from ocp.checks.progress import told
 from ocp.checks.rich_text import html_of
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
@@ -158,6 +159,7 @@ __all__ = [
     "stationary",
     "symbol_type",
     "time_unit",
+    "told",
     "undefined_call",
     "walk",
     "with_checksum",

@@ -19,6 +19,7 @@ from ocp.checks.arguments import (
     check_positive,
 )
 from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.checks.progress import Progress
 from ocp.closed_loop.decision import ControlRefused, Decision, StepReport
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
@@ -327,11 +328,13 @@ class MPC:
         *,
         seed: int = 0,
         watch: Observer | None = None,
+        progress: Progress | None = None,
     ) -> Rollout:
         """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval.
 
         Raises:
             ProblemError: if states or inputs of plant and problem differ in number.
+            Interrupted: on Ctrl-C; its ``so_far`` is the rollout until then.
         """
         check_instance(plant, Plant, f"MPC of {self.ocp.name}: plant")
         for what, ours, theirs in (
@@ -343,7 +346,9 @@ class MPC:
                     f"MPC of {self.ocp.name}: {ours} {what}, but the plant '{plant.ocp.name}' "
                     f"has {theirs}"
                 )
-        return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+        return closed_loop(
+            self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch, progress=progress
+        )
 
 
 def _copied(kind: type[MPC], options: dict[str, Any], state: ControllerState) -> MPC:
