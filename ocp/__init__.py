@@ -1,6 +1,8 @@
 """What an optimal control problem is, and what is true of it whoever solves it."""
 
 from ocp.checks.errors import DamagedFile, OCPError, ProblemError, SolverError, UnsupportedProblem
+from ocp.checks.progress import Interrupted, Progress, TextProgress
+from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Controller, ControlRefused, Decision, InputSource, StepReport
 from ocp.closed_loop.feedback_law import FeedbackLaw
 from ocp.closed_loop.plant import Plant
@@ -53,6 +55,7 @@ __all__ = [
     "Box",
     "Compiler",
     "Constraint",
+    "ConstraintTable",
     "ControlRefused",
     "Controller",
     "DamagedFile",
@@ -70,6 +73,7 @@ __all__ = [
     "InputSource",
     "Integrator",
     "InterpretedWarning",
+    "Interrupted",
     "Link",
     "Measurement",
     "Midpoint",
@@ -87,6 +91,7 @@ __all__ = [
     "Polyhedron",
     "ProblemError",
     "Program",
+    "Progress",
     "Radau",
     "Rate",
     "Record",
@@ -100,6 +105,7 @@ __all__ = [
     "Status",
     "StepReport",
     "Table",
+    "TextProgress",
     "Unknown",
     "UnsupportedProblem",
     "Work",

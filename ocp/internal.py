@@ -12,6 +12,8 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.interrupts import interruptible
+from ocp.checks.progress import told
+from ocp.checks.rich_text import html_of
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
 from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
@@ -143,6 +145,7 @@ __all__ = [
     "excess",
     "external",
     "hamiltonian",
+    "html_of",
     "instant_fractions",
     "interpolate",
     "interruptible",
@@ -171,6 +174,7 @@ __all__ = [
     "stationary",
     "symbol_type",
     "time_unit",
+    "told",
     "undefined_call",
     "walk",
     "with_checksum",

@@ -7,8 +7,19 @@ from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 
-from ocp import OCP, Guess, Phases, PhasesSolution, ProblemError, Solution, Solver, evaluate
-from ocp.internal import check_instance, check_not_negative, check_positive, check_whole
+from ocp import (
+    OCP,
+    Guess,
+    Interrupted,
+    Phases,
+    PhasesSolution,
+    ProblemError,
+    Progress,
+    Solution,
+    Solver,
+    evaluate,
+)
+from ocp.internal import check_instance, check_not_negative, check_positive, check_whole, told
 from solvers.indirect.indirect_shooting import IndirectShooting
 
 # Two answers whose true costs and states agree to this, relative, are the same optimum.
@@ -45,6 +56,7 @@ def multistart(
     amplitude: float = 3.0,
     violation: float = 1e-4,
     guesses: Sequence[Any] = (),
+    progress: Progress | None = None,
 ) -> tuple[LocalOptimum[Solution], ...]: ...
 
 
@@ -58,6 +70,7 @@ def multistart(
     amplitude: float = 3.0,
     violation: float = 1e-4,
     guesses: Sequence[Any] = (),
+    progress: Progress | None = None,
 ) -> tuple[LocalOptimum[PhasesSolution], ...]: ...
 
 
@@ -70,6 +83,7 @@ def multistart(
     amplitude: float = 3.0,
     violation: float = 1e-4,
     guesses: Sequence[Any] = (),
+    progress: Progress | None = None,
 ) -> tuple[LocalOptimum[Any], ...]:
     """Solve from several starts and return the distinct local optima, best first.
 
@@ -86,12 +100,14 @@ def multistart(
             not count.
         guesses: tried after the problem's own start, besides the random ones, such as
             ``via_point_guesses``; of phases one tuple with a guess for each.
+        progress: told after each start how many are done, and the best cost so far.
 
     Returns:
         optima with their true costs; empty if no start succeeded.
 
     Raises:
         ProblemError: if there is no start, or the solver does not start from controls.
+        Interrupted: on Ctrl-C; its ``so_far`` are the optima that were found.
     """
     if not isinstance(ocp, Phases):
         check_instance(ocp, OCP, "multistart: ocp")
@@ -106,15 +122,34 @@ def multistart(
     started = perf_counter()
     program = ocp.built_by(solver) if isinstance(ocp, Phases) else solver.build(ocp)
     build_time = perf_counter() - started
+    tried = (None, *guesses, *_guesses(ocp, starts - 1, seed, amplitude))
+    report = told(progress, "multistart")
     found: list[LocalOptimum[Any]] = []
-    for guess in (None, *guesses, *_guesses(ocp, starts - 1, seed, amplitude)):
-        solution: Any = program.run(guess=guess).with_(build_time=build_time)
-        if not solution.status.is_success:
-            continue
-        verdict = evaluate(solution)
-        if verdict.violation <= violation:
-            found = _merged(found, LocalOptimum(solution, verdict.cost, 1))
+    try:
+        for k, guess in enumerate(tried):
+            report(k, len(tried), _best(found))
+            solution: Any = program.run(guess=guess).with_(build_time=build_time)
+            if not solution.status.is_success:
+                continue
+            verdict = evaluate(solution)
+            if verdict.violation <= violation:
+                found = _merged(found, LocalOptimum(solution, verdict.cost, 1))
+        report(len(tried), len(tried), _best(found))
+    except KeyboardInterrupt:
+        raise Interrupted("multistart", _in_order(found)) from None
+    return _in_order(found)
+
+
+def _in_order(found: list[LocalOptimum[Any]]) -> tuple[LocalOptimum[Any], ...]:
+    """Return optima, the cheapest first."""
     return tuple(sorted(found, key=lambda optimum: optimum.cost))
+
+
+def _best(found: list[LocalOptimum[Any]]) -> str:
+    """Say how many optima there are, and the best cost."""
+    if not found:
+        return "no optimum yet"
+    return f"{len(found)} optima, best cost {min(o.cost for o in found):.6g}"
 
 
 def random_guesses(ocp: OCP, number: int, seed: int, amplitude: float = 3.0) -> list[Guess]:

@@ -24,7 +24,7 @@ def test_the_readmes_examples_do_what_they_say(names, tmp_path):
     costs = [names["evaluate"](s).cost for s in (direct, gradient, extremal)]
     assert costs == pytest.approx([costs[2]] * 3, rel=1e-3)
     rollout = names["rollout"]
-    assert repr(rollout).endswith("violation 0, 80 optimal>")
+    assert repr(rollout).endswith("nothing violated, 80 optimal>")
     assert rollout.violation == 0.0
     for picture in ("swing.png", "loop.png"):
         assert (tmp_path / picture).stat().st_size > 10_000

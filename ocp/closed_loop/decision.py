@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from ocp.checks.errors import OCPError
+from ocp.checks.rich_text import html_of
 from ocp.solution.solution import Solution
 from ocp.solution.status import Status
 
@@ -77,6 +78,24 @@ class Decision(StepReport):
     plan: Solution | None = None
     age: int = 0
     clipped: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return one line: when, which input, and where it comes from."""
+        values = ", ".join(f"{v:.4g}" for v in self.input)
+        why = f": {self.message}" if self.message else ""
+        return f"<Decision at t = {self.t:g} s: ({values}), {self.source.name}{why}>"
+
+    def _repr_html_(self) -> str:
+        """Return what was decided and why, for a notebook."""
+        facts = [
+            ("input", np.array2string(self.input, precision=6)),
+            ("source", self.source.value),
+            ("why not a better one", self.message or "-"),
+            ("solver", self.status.words if self.status else "not run"),
+            ("measured at, acts from [s]", f"{self.t:g}, {self.applies_at:g}"),
+            ("time used [s]", f"{self.time_used:.3g}"),
+        ]
+        return html_of(f"Decision: {self.source.name}", facts=facts)
 
 
 @runtime_checkable

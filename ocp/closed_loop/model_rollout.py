@@ -96,6 +96,22 @@ class ModelRollout:
             found.append(rows.path.largest_violation(values, t, exempt=self._exempt, sizes=own))
         return _in_words(max(found, key=_relative)) if found else (0.0, "")
 
+    def each_excess(
+        self, x: np.ndarray, u: np.ndarray, t: np.ndarray, p: IntervalParameters
+    ) -> tuple[Violation, ...]:
+        """Return the largest violation of every row that limits anything, as ``excess`` sees it."""
+        rows, found = self._rows, []
+        if rows.states.is_imposed:
+            exempt = self._exempt_states[1:]
+            found += rows.states.largest_of_each(x[1:], t[1:], exempt=exempt)
+        if rows.controls.is_imposed:
+            found += rows.controls.largest_of_each(u, t)
+        if rows.path.is_imposed:
+            nodes = np.vstack([p[0], p[1][-1:]])
+            values = self._path(x.T, np.vstack([u, u[-1:]]).T, t[None, :], nodes.T)[0].T
+            found += rows.path.largest_of_each(values, t, exempt=self._exempt)
+        return tuple(v for v in found if v.row is not None and v.row.is_limited)
+
     def end_excess(self, x: np.ndarray, t: float, p: np.ndarray) -> tuple[float, str]:
         """Return the largest violation of a terminal constraint by a final state (nx,)."""
         terminal = self._rows.terminal

@@ -14,6 +14,7 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.errors import ProblemError
+from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.model_rollout import ModelRollout
 from ocp.problem.constraint import Box
 from ocp.problem.constraint_rows import Violation
@@ -57,6 +58,19 @@ class Plant:
     parameters: Callable[[float], Mapping[str, ArrayLike]] | None = None
     jitter: float = 0.0
 
+    def __repr__(self) -> str:
+        """Return one line: what it is, and how it differs from its problem."""
+        faults = [
+            (np.any(self.process_noise), "process noise"),
+            (np.any(self.measurement_noise), "measurement noise"),
+            (self.disturbance is not None, "disturbance"),
+            (self.lag, f"lag {self.lag:g} s"),
+            (self.jitter, f"jitter {self.jitter:g}"),
+            (self.parameters is not None, "parameters of its own"),
+        ]
+        said = ", ".join(what for there, what in faults if there)
+        return f"<Plant '{self.ocp.name}': {said or 'no fault'}>"
+
     def __post_init__(self) -> None:
         """Check the numbers."""
         check_instance(self.ocp, OCP, "plant: ocp")
@@ -93,6 +107,7 @@ class RunningPlant:
     Attributes:
         t: time [s].
         x: true state (nx,).
+        violations: the largest violation of every constraint so far, of rates not.
     """
 
     def __init__(self, plant: Plant, x0: np.ndarray, seed: int) -> None:
@@ -105,6 +120,7 @@ class RunningPlant:
         self._model = ModelRollout(plant.ocp, steps, control_at_end=not discrete)
         self._declared = plant.ocp.parameter_values().at(0.0)[0]
         self._last_input = plant.ocp.last_input
+        self.violations = ConstraintTable()
 
     def measure(self) -> np.ndarray:
         """Return the state as the sensors have it (nx,)."""
@@ -123,8 +139,11 @@ class RunningPlant:
         dt *= 1.0 + plant.jitter * self._rng.uniform(-1.0, 1.0) if plant.jitter else 1.0
         times = self.t + np.linspace(0.0, dt, self._model.n + 1)
         p = np.array([self._parameters(t) for t in times])
-        trial = self._model.of(self.x, self._acted(given, times), times, (p[:-1], p[1:]))
+        acted = self._acted(given, times)
+        trial = self._model.of(self.x, acted, times, (p[:-1], p[1:]))
+        each = self._model.each_excess(trial.x, acted, times, (p[:-1], p[1:]))
         price, of_rate = self._rated(given, dt)
+        self.violations = self.violations.with_(plant.ocp, each)
         self.x, self.t = trial.x[-1], float(times[-1])
         noise = np.asarray(plant.process_noise)
         if noise.any():

@@ -1,23 +1,27 @@
 """The record of a closed loop."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ocp.checks.arguments import check_instance
+from ocp.checks.arguments import check_instance, check_whole
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.checks.rich_text import html_of
+from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Decision, InputSource
 from ocp.files.archive import made_of, read_archive, write_archive
 from ocp.loop_plotting.loop_record import Draw, Progress
+from ocp.plotting.compare import compared
+from ocp.plotting.view import View
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
 from ocp.problem.ocp import OCP
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from ocp.plotting.picture import Picture
 
 # A loop that takes more of its steps from the rungs without a good plan lives on them.
 _TOLERATED = 0.05
@@ -41,6 +45,8 @@ class Rollout:
         violation: the plant's largest violation of a bound or constraint.
         worst: which, and the end of the sampling interval it happened in; empty where nothing is
             violated.
+        violations: the largest violation of every bound and constraint, when, and in which unit;
+            print it as a table.
         drift: largest violation of the plant's invariants at the sampling instants, such as
             the task error of an arm.
         step_times: time of each decision [s], (K,).
@@ -65,6 +71,7 @@ class Rollout:
     step_times: np.ndarray
     clipped: np.ndarray
     ended: str = ""
+    violations: ConstraintTable = field(default_factory=ConstraintTable)
     decisions: tuple[Decision, ...] = ()
     late: int = 0
 
@@ -72,9 +79,20 @@ class Rollout:
         """Return one line: what was controlled, what it cost, and where the inputs came from."""
         return (
             f"<Rollout of '{self.plant.name}': {self.t[-1]:g} s, cost {self.cost:.6g}, "
-            f"violation {self.violation:.2g}, {self.decided_by}>"
+            f"{self.worst or 'nothing violated'}, {self.decided_by}>"
             f"{chr(10) + self.advice if self.advice else ''}"
         )
+
+    def _repr_html_(self) -> str:
+        """Return the loop in numbers, and the table of its constraints, for a notebook."""
+        facts = [
+            ("closed-loop cost", f"{self.cost:.6g}"),
+            ("largest violation", self.worst or "none"),
+            ("inputs", self.decided_by),
+            ("slowest decision [s]", f"{self.step_times.max(initial=0.0):.3g}"),
+        ]
+        facts += [("advice", self.advice)] if self.advice else []
+        return html_of(f"Loop with {self.plant.name}", str(self.violations), facts)
 
     @property
     def advice(self) -> str:
@@ -122,11 +140,46 @@ class Rollout:
             raise SolverError(f"the loop ended at t = {self.t[-1]:g} s: {self.ended}", self)
         return self
 
-    def plot(self) -> "Figure":
-        """Return a figure of states, inputs, their sources and cost over time."""
+    def plot(
+        self,
+        variables: Sequence[str] = (),
+        *,
+        compare: "Rollout | Mapping[str, Rollout] | None" = None,
+        time_unit: str = "s",
+        constraints: str = "active",
+        plans: int = 0,
+        plane: Sequence[str] | None = None,
+        against: str = "time",
+    ) -> "Picture":
+        """Return a picture: a panel for each state and input, and the running cost.
+
+        True states are lines, what the controller was told are circles, references of its cost
+        are dotted, limits of the plant are hatched; where the input does not come from an optimal
+        plan the background is coloured.
+
+        Args:
+            variables: names of what is drawn, in this order; ``"running cost"`` is one. Empty:
+                everything.
+            compare: another rollout, or several by name: ``{"no backup": other}``.
+            time_unit: ``"ms"``, ``"s"``, ``"min"``, ``"h"`` or ``"d"``.
+            constraints: which path constraints have a panel: the ``"active"`` ones, ``"all"`` or
+                ``"none"``.
+            plans: every how many steps the plan ahead is drawn; 0: no plan. A rollout that was
+                loaded has none.
+            plane: two names ``(x, y)``: one picture of y over x instead.
+            against: name of what is on the horizontal axis.
+
+        Returns:
+            a matplotlib ``Figure``; ``picture["speed"]`` are the axes that show the speed.
+
+        Raises:
+            ProblemError: if the loop has no step, a name is of nothing, or a unit is none.
+        """
         from ocp.loop_plotting.rollout import plot_rollout  # matplotlib takes a second
 
-        return plot_rollout(self)
+        view = View(variables, against, time_unit, constraints)
+        check_whole(plans, "plot: plans", least=0)
+        return plot_rollout(compared(self, compare, Rollout, "a Rollout"), view, plane, plans)
 
     def animate(
         self,
@@ -180,6 +233,7 @@ class Rollout:
             "messages": np.array(self.messages, dtype=str),
             "plant": self.plant.name,
         }
+        content |= self.violations.entries()
         content |= fingerprint_entries(self.plant)
         return write_archive(path, "rollout", content)
 
@@ -215,6 +269,7 @@ class Rollout:
             plant=plant,
             **{name: np.asarray(data[name], dtype=float) for name in _ARRAYS},
             **{name: kind(data[name][()]) for name, kind in _SCALARS.items()},
+            violations=ConstraintTable.of_entries(data),
             sources=tuple(InputSource[name] for name in names),
             messages=tuple(map(str, data["messages"])),
         )

@@ -15,11 +15,11 @@ from ocp.checks.arguments import (
     check_whole,
 )
 from ocp.checks.errors import ProblemError
+from ocp.checks.progress import Interrupted, Progress, told
 from ocp.closed_loop.decision import (
     Controller,
     ControlRefused,
     Decision,
-    PreparingController,
 )
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.plant import Plant, RunningPlant
@@ -42,6 +42,7 @@ def closed_loop(
     head_start: bool = False,
     sensors: SensorFault | None = None,
     watch: Observer | None = None,
+    progress: Progress | None = None,
 ) -> Rollout:
     """Run a controller on a plant.
 
@@ -65,11 +66,14 @@ def closed_loop(
         watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is;
             where it raises ``OSError``, as on a full disk, a warning says so, and it is called no
             more.
+        progress: told after each step how many are done, and which rungs decided.
 
     Raises:
         ProblemError: if the plant takes another input than the controller sends, the duration is
             no multiple of dt, or a function of the plant returns what does not fit.
+        Interrupted: on Ctrl-C; its ``so_far`` is the rollout until then.
     """
+    report = told(progress, "closed loop")
     check_instance(controller, Controller, "closed loop: controller")
     check_instance(plant, Plant, "closed loop: plant")
     for fault, what in ((sensors, "sensors"), (watch, "watch")):
@@ -90,22 +94,30 @@ def closed_loop(
     observer = _Observing(watch) if watch else None
     journal = _Journal.begun(plant.ocp, plant.started(x0, seed), late)
     ahead = [] if head_start else [first] * late
-    for k in range(-late if head_start else 0, steps):
-        measured, t = journal.running.measure(), journal.running.t if k >= 0 else k * dt
-        told = sensors(measured, t) if sensors else measured
-        try:
-            decision = _decided(controller, told, t, plant.ocp, observer)
-        except ControlRefused as refusal:
-            journal.ended = str(refusal)
-            break
-        if isinstance(controller, PreparingController):
-            controller.prepare_next()
-        ahead.append(decision.input)
-        if k >= 0:
-            journal.advance(told, decision, ahead.pop(0), dt)
-        if not np.isfinite(journal.running.x).all():
-            journal.ended = "the plant's state blows up"
-            break
+    try:
+        for k in range(-late if head_start else 0, steps):
+            t = journal.running.t if k >= 0 else k * dt
+            measured = journal.running.measure()
+            seen = sensors(measured, t) if sensors else measured
+            try:
+                decision = _decided(controller, seen, t, plant.ocp, observer)
+            except ControlRefused as refusal:
+                journal.ended = str(refusal)
+                break
+            ahead.append(decision.input)
+            if k >= 0:
+                journal.advance(seen, decision, ahead.pop(0), dt)
+            report(
+                max(k + 1, 0),
+                steps,
+                f"t = {journal.running.t:.4g} s, {decision.source.name.lower()}",
+            )
+            if not np.isfinite(journal.running.x).all():
+                journal.ended = "the plant's state blows up"
+                break
+    except KeyboardInterrupt:
+        journal.ended = "stopped by Ctrl-C"
+        raise Interrupted("the loop", journal.rollout()) from None
     return journal.rollout()
 
 
@@ -183,8 +195,11 @@ class _Journal:
 
     def rollout(self) -> Rollout:
         """Return what was recorded."""
-        t, x = np.array(self.t), np.array(self.x)
-        m, steps = self.ocp.model, len(self.inputs)
+        steps = len(self.x) - 1  # of a step that was interrupted some lists may have an entry more
+        for entries in (self.measured, self.inputs, self.decisions, self.costs):
+            del entries[steps:]
+        t, x = np.array(self.t[: steps + 1]), np.array(self.x)
+        m = self.ocp.model
         return Rollout(
             plant=self.ocp,
             t=t,
@@ -195,6 +210,7 @@ class _Journal:
             messages=tuple(d.message for d in self.decisions),
             costs=np.array(self.costs),
             violation=self.violation,
+            violations=self.running.violations,
             worst=self.worst,
             drift=_drift(self.ocp, t, x),
             step_times=np.array([d.time_used for d in self.decisions]),

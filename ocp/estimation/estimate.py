@@ -14,6 +14,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_flag, check_instance
 from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.checks.rich_text import html_of
 from ocp.estimation.sensitivities import Estimated, residual_slopes
 from ocp.referee.delayed_controls import with_acting_controls
 from ocp.solution.solution import Solution
@@ -57,6 +58,15 @@ class Estimate:
         """Correlation of the values (n, n); 0 with what a bound holds."""
         errors = np.where(self.standard_errors > 0.0, self.standard_errors, np.inf)
         return self.covariance / errors / errors[:, None]
+
+    def __repr__(self) -> str:
+        """Return all values in one line."""
+        each = zip(self.names, self.values, self.standard_errors, strict=True)
+        return f"<Estimate: {', '.join(f'{n} = {v:.4g} +- {e:.1g}' for n, v, e in each)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the values with their errors, for a notebook."""
+        return html_of("Estimate", str(self))
 
     def __str__(self) -> str:
         """Return one line for each value, with its standard error."""

@@ -68,6 +68,10 @@ class Network:
         found: Any = self.function.call(columns)[0]
         return ca.vec(found) if kind else np.array(found).reshape(-1)
 
+    def __repr__(self) -> str:
+        """Return one line: its file, and how many numbers it takes."""
+        return f"<Network {Path(self.file).name}: inputs of {self.sizes}>"
+
     def __str__(self) -> str:
         """Return what messages call it."""
         return f"network {Path(self.file).name}"

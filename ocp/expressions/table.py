@@ -66,6 +66,11 @@ class Table:
     between: Between = "cubic"
     name: str = "table"
 
+    def __repr__(self) -> str:
+        """Return one line: its size, and what holds between and beyond the samples."""
+        size = " x ".join(map(str, np.shape(self.values)))
+        return f"<Table '{self.name}': {size} samples, {self.between}, beyond: {self.beyond}>"
+
     def __post_init__(self) -> None:
         """Check grid and samples."""
         if not isinstance(self.name, str) or not ca.Function.check_name(self.name):

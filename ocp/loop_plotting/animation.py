@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from ocp.checks.arguments import check_callable, check_instance, check_positive, check_whole
 from ocp.checks.errors import ProblemError
 from ocp.files.draft import replacing
-from ocp.loop_plotting.loop_record import Draw, LoopRecord, PlannedInput, Progress
+from ocp.loop_plotting.loop_record import Draw, LoopRecord, Progress
+from ocp.loop_plotting.plans import controls_ahead, plans_of, sends_controls, states_ahead
 from ocp.loop_plotting.rollout import COLOURS, labels, refuse_empty
-from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 
 _DPI = 80
@@ -23,9 +23,6 @@ _DPI = 80
 _STAYS, _MOST = 0.5, 3000
 # The file format counts hundredths of a second, and viewers show no frame for less than two.
 _FASTEST = 50
-# An input is the control of its plan if it lies between its values in the interval, up to this.
-_SAME = 1e-4
-_INSTANTS = 5
 
 
 def animate_rollout(
@@ -156,14 +153,14 @@ class _Film:
         upper = figure.add_subplot(grid[0, -1])
         lower = figure.add_subplot(grid[1, -1], sharex=upper)
         scene = figure.add_subplot(grid[:, 0]) if draw else None
-        model, plans = rollout.plant.model, _plans(rollout)
+        model, plans = rollout.plant.model, plans_of(rollout)
         inputs = np.vstack([rollout.inputs, rollout.inputs[-1:]])
         is_same = all(plan.x.shape[1] == model.nx for plan in plans)
         states = _AnimatedPanel(
-            upper, rollout.t, rollout.x, False, _states_ahead if is_same else None
+            upper, rollout.t, rollout.x, False, states_ahead if is_same else None
         )
         sent = _AnimatedPanel(lower, rollout.t[: len(inputs)], inputs, True,
-                      _controls_ahead if _sends_controls(rollout) else None)  # fmt: skip
+                      controls_ahead if sends_controls(rollout) else None)  # fmt: skip
         end = max([rollout.t[-1], *(plan.t[-1] for plan in plans)])
         states.prepare("states", labels(model.x_names, model.x_units), plans, end)
         sent.prepare("inputs", labels(model.u_names, model.u_units), plans, end)
@@ -187,43 +184,5 @@ class _Film:
             self.draw(self.scene, _between(rollout.t, rollout.x, t), t)
 
 
-def _plans(rollout: LoopRecord) -> list[Solution]:
-    return [d.plan for d in rollout.decisions if d.plan is not None]
-
-
 def _between(t: np.ndarray, rows: np.ndarray, at: float) -> np.ndarray:
     return np.array([np.interp(at, t, column) for column in rows.T])
-
-
-def _left(plan: Solution, t: float) -> np.ndarray:
-    """Return t and the nodes of a plan after it; none where it is over."""
-    first = max(t, plan.t[0])
-    return np.append(first, plan.t[plan.t > first]) if first < plan.t[-1] else np.empty(0)
-
-
-def _states_ahead(plan: Solution, t: float) -> tuple[np.ndarray, np.ndarray]:
-    times = _left(plan, t)
-    columns = [np.interp(times, plan.t, column) for column in plan.x.T]
-    return times, np.stack(columns, axis=1)
-
-
-def _controls_ahead(plan: Solution, t: float) -> tuple[np.ndarray, np.ndarray]:
-    times, nu = _left(plan, t), plan.problem.model.nu
-    return times, np.array([plan_controls(plan, at) for at in times]).reshape(len(times), nu)
-
-
-def _sends_controls(rollout: LoopRecord) -> bool:
-    """Whether what is sent are the controls of the plans, not the rates of their states."""
-    followed = [(d, d.plan) for d in rollout.decisions if d.plan is not None]
-    dt = float(np.diff(rollout.t).max())
-    return all(_is_control(decision, plan, dt) for decision, plan in followed)
-
-
-def _is_control(decision: PlannedInput, plan: Solution, dt: float) -> bool:
-    span = decision.applies_at + np.linspace(0.0, dt, _INSTANTS)
-    near = np.array([plan_controls(plan, float(t)) for t in span])
-    if near.shape[1] != len(decision.input):
-        return False
-    slack = _SAME * (1.0 + np.abs(near).max()) + decision.clipped
-    low, high = near.min(axis=0) - slack, near.max(axis=0) + slack
-    return bool(((low <= decision.input) & (decision.input <= high)).all())

@@ -1,7 +1,7 @@
 """What the pictures of a closed loop read."""
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -39,6 +39,11 @@ class PlannedInput(Protocol):
         ...
 
     @property
+    def parameters(self) -> Mapping[str, np.ndarray]:
+        """Values of parameters, and samples of signals ahead, by name."""
+        ...
+
+    @property
     def clipped(self) -> float:
         """By how much it was moved into its bounds."""
         ...
@@ -68,6 +73,11 @@ class LoopRecord(Protocol):
         ...
 
     @property
+    def measured(self) -> np.ndarray:
+        """What the controller was told (K, nx)."""
+        ...
+
+    @property
     def inputs(self) -> np.ndarray:
         """What acted in each interval (K, m)."""
         ...
@@ -90,6 +100,11 @@ class LoopRecord(Protocol):
     @property
     def ended(self) -> str:
         """Why the loop ended early."""
+        ...
+
+    @property
+    def counts(self) -> Mapping[Any, int]:
+        """How many inputs came from each source."""
         ...
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import UnsupportedProblem
+from ocp.checks.rich_text import counted
 from ocp.minimum_principle.hamiltonian import Hamiltonian, hamiltonian
 from ocp.minimum_principle.minimising_control import minimising_control
 from ocp.problem.cache import once_per_problem
@@ -48,6 +49,11 @@ class MinimumPrinciple:
     flow: ca.Function
     start: ca.Function
     end: ca.Function
+
+    def __repr__(self) -> str:
+        """Return one line: of how many states and controls."""
+        nx, nu = self.control.numel_in(0), self.control.numel_out(0)
+        return f"<MinimumPrinciple: {counted(nx, 'state')}, {counted(nu, 'control')}>"
 
 
 @once_per_problem

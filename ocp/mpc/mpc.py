@@ -19,6 +19,7 @@ from ocp.checks.arguments import (
     check_positive,
 )
 from ocp.checks.errors import ProblemError, UnsupportedProblem
+from ocp.checks.progress import Progress
 from ocp.closed_loop.decision import ControlRefused, Decision, StepReport
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.guarded_call import CALLBACK_ERRORS
@@ -137,6 +138,13 @@ class MPC:
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
     # The thread that is inside a step.
     _inside: int | None = field(default=None, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        """Return one line: of what, by what, and how often."""
+        late = f", delay {self.delay:g} s" if self.delay else ""
+        return (
+            f"<MPC of '{self.ocp.name}' by {type(self.solver).__name__}, dt = {self.dt:g} s{late}>"
+        )
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""
@@ -312,11 +320,13 @@ class MPC:
         *,
         seed: int = 0,
         watch: Observer | None = None,
+        progress: Progress | None = None,
     ) -> Rollout:
         """Control a plant for a while [s]: ``closed_loop`` with the controller's own interval.
 
         Raises:
             ProblemError: if states or inputs of plant and problem differ in number.
+            Interrupted: on Ctrl-C; its ``so_far`` is the rollout until then.
         """
         check_instance(plant, Plant, f"MPC of {self.ocp.name}: plant")
         for what, ours, theirs in (
@@ -328,7 +338,9 @@ class MPC:
                     f"MPC of {self.ocp.name}: {ours} {what}, but the plant '{plant.ocp.name}' "
                     f"has {theirs}"
                 )
-        return closed_loop(self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch)
+        return closed_loop(
+            self, plant, x0, duration, dt=self.dt, seed=seed, watch=watch, progress=progress
+        )
 
 
 def _copied(kind: type[MPC], options: dict[str, Any], state: ControllerState) -> MPC:

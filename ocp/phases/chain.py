@@ -52,6 +52,10 @@ class Chain(Portable):
         """Names of the phases."""
         return tuple(phase.name for phase in self.phases)
 
+    def __repr__(self) -> str:
+        """Return one line: the phases by name."""
+        return f"<Phases '{self.name}': {', '.join(self.names)}>"
+
     @cached_property
     def derived(self) -> dict[str, Any]:
         """What other files have made of it, kept as long as it exists."""

@@ -17,7 +17,7 @@ from ocp.solution.composite import CompositeProblem
 from ocp.solution.solver import Solver
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Phases(Chain, CompositeProblem[PhasesSolution]):
     r"""Problems one after another: the start of each follows from the end of the one before.
 

@@ -6,8 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ocp.checks.rich_text import html_of
 from ocp.phases.side_by_side import SideBySide
 from ocp.referee.evaluate import Evaluation, evaluate
+from ocp.referee.verdict_in_words import verdict_facts, verdict_in_words
 from ocp.solution.solution import Solution
 
 
@@ -40,6 +42,14 @@ class PhasesEvaluation:
     defect: float
     task_drift: float
     whole: Solution
+
+    def __repr__(self) -> str:
+        """Return one line: what the controls cost and violate."""
+        return f"<Evaluation of {len(self.phases)} phases: {verdict_in_words(self)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the numbers, for a notebook."""
+        return html_of("Evaluation", facts=verdict_facts(self, self.stationarity))
 
     @cached_property
     def stationarity(self) -> float | None:

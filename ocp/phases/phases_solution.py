@@ -1,5 +1,6 @@
 """A solution of phases: one of each, with what couples them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,17 +10,21 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance
 from ocp.checks.errors import SolverError
+from ocp.checks.rich_text import html_of
 from ocp.phases.chain import Chain
 from ocp.phases.phases_evaluation import PhasesEvaluation, evaluate_phases
 from ocp.phases.side_by_side import SideBySide, side_by_side
 from ocp.phases.way_back import begun, phase_solutions
+from ocp.plotting.compare import compared
+from ocp.plotting.plottable import Pictured
+from ocp.plotting.view import View
 from ocp.problem.portable import without_caches
 from ocp.solution.composite import CompositeSolution
 from ocp.solution.solution import Solution
 from ocp.solution.status import Status
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from ocp.plotting.picture import Picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +133,18 @@ class PhasesSolution(CompositeSolution[PhasesEvaluation]):
             f"cost {self.cost:.6g}, {self.iterations} iterations>"
         )
 
+    def _repr_html_(self) -> str:
+        """Return what was found in numbers, for a notebook."""
+        each = zip(self.problem.names, self.durations, strict=True)
+        facts = [
+            ("status", self.status.words),
+            ("message", self.message or "-"),
+            ("cost, the solver's own", f"{self.cost:.9g}"),
+            *((f"duration of {name} [s]", f"{duration:.6g}") for name, duration in each),
+            ("solver", self.solver),
+        ]
+        return html_of(f"Solution of {self.problem.name}", facts=facts)
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what is copied and pickled: the fields."""
         return without_caches(self)
@@ -143,12 +160,45 @@ class PhasesSolution(CompositeSolution[PhasesEvaluation]):
         """Return a copy with some fields of ``whole`` replaced, such as status and message."""
         return replace(self, whole=self.whole.with_(**changes))
 
-    def plot(self) -> "Figure":
-        """Return a figure of states, controls and costates of all phases over time."""
-        # matplotlib takes a second to import: only who plots waits
-        from ocp.plotting.phases import plot_phases
+    def plot(
+        self,
+        variables: Sequence[str] = (),
+        *,
+        compare: "PhasesSolution | Mapping[str, PhasesSolution] | None" = None,
+        against: str = "time",
+        time_unit: str = "s",
+        constraints: str = "active",
+        costates: bool = False,
+        plane: Sequence[str] | None = None,
+    ) -> "Picture":
+        """Return a picture of all phases, one after another; see ``Solution.plot``.
 
-        return plot_phases(self.problem.name, self.phases, self.problem.names)
+        Phases are shaded in turn and named. What has the same name in two phases is one curve,
+        with the limits that each of them has.
+
+        Raises:
+            ProblemError: if a name is of nothing, a unit is none, or problems do not compare.
+        """
+        # matplotlib takes a second to import: only who plots waits
+        from ocp.plotting.plot import plot
+
+        view = View(variables, against, time_unit, constraints, costates)
+        shown = compared(self, compare, PhasesSolution, "a solution of phases")
+        return plot({label: s._pictured for label, s in shown.items()}, view, plane)
+
+    @property
+    def _pictured(self) -> Pictured:
+        """What a picture says of it."""
+        problem = self.problem
+        return Pictured(
+            problem.name,
+            self.status,
+            self.message,
+            self.cost,
+            self.unknowns,
+            self.phases,
+            problem.names,
+        )
 
     def save(self, path: str | Path) -> Path:
         """Write everything to one ``.npz`` file; return its path. See ``Solution.save``."""

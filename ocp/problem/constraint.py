@@ -17,7 +17,7 @@ from ocp.checks.arguments import (
     check_numeric,
 )
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_column
+from ocp.checks.expressions import check_column, readable
 from ocp.problem.portable import Portable
 
 Place = Literal["path", "initial", "terminal", "integral", "instants"]
@@ -215,6 +215,13 @@ class Constraint(Portable):
             raise ProblemError(
                 f"constraint '{self.name}' limits an input: it has to hold at='path'"
             )
+
+    def __repr__(self) -> str:
+        """Return one line: the expression, its bounds, and where it holds."""
+        rows = ", ".join(readable(row) for row in ca.vertsplit(self.expression))
+        ends = f"{np.asarray(self.lower)} to {np.asarray(self.upper)}"
+        soft = ", soft" if self.soft is not None else ""
+        return f"<Constraint '{self.name}', {self.at}{soft}: {rows} in {ends}>"
 
     def _check_place(self) -> None:
         what = f"constraint '{self.name}': at"

@@ -48,6 +48,11 @@ class ConstraintRow:
         """Whether the row is an equation."""
         return self.lower == self.upper
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether it can be violated at all."""
+        return self.lower > -np.inf or self.upper < np.inf
+
     def __str__(self) -> str:
         """Return what a message calls it."""
         return self.label or self.name
@@ -227,6 +232,27 @@ class ConstraintRows:
         k, i = divmod(int(relative.argmax()), len(self.rows))
         amount, size = float(excess[k, i]), 1.0 if sizes is None else float(sizes[i])
         return Violation(amount, self.rows[i], float(t[k]), size) if amount > 0.0 else Violation()
+
+    def largest_of_each(
+        self, values: np.ndarray, t: np.ndarray, *, exempt: np.ndarray | None = None
+    ) -> tuple[Violation, ...]:
+        """Return the largest violation of every row along a trajectory, 0 where there is none.
+
+        Args:
+            values: (K, m).
+            t: instants [s], (K,).
+            exempt: where a row does not hold, bool (K, m).
+        """
+        if not values.size:
+            return ()
+        excess = self.excess(values)
+        if exempt is not None:
+            excess[exempt] = 0.0
+        when = excess.argmax(axis=0)
+        return tuple(
+            Violation(float(excess[k, i]), row, float(t[k]))
+            for i, (k, row) in enumerate(zip(when, self.rows, strict=True))
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,17 @@ class Guess:
     duration: float | None = None
     unknowns: Mapping[str, ArrayLike] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return one line: which parts it has, and how many samples."""
+        parts = [
+            f"{name} {np.shape(value)}"
+            for name, value in (("x", self.x), ("u", self.u), ("costate", self.costate))
+            if value is not None
+        ]
+        parts += [f"duration {self.duration:g} s"] if self.duration is not None else []
+        parts += [f"unknowns {', '.join(self.unknowns)}"] if self.unknowns else []
+        return f"<Guess: {', '.join(parts) or 'nothing'}>"
+
     def __post_init__(self) -> None:
         """Check the duration; the shapes are checked where they are known."""
         check_instance(self.unknowns, Mapping, "guess: unknowns (values by name)")

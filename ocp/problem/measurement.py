@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError
-from ocp.checks.expressions import check_column
+from ocp.checks.expressions import check_column, readable
+from ocp.checks.rich_text import counted
 from ocp.problem.portable import Portable
 
 
@@ -70,6 +71,11 @@ class Measurement(Portable):
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         object.__setattr__(self, "expression", expression)
+
+    def __repr__(self) -> str:
+        """Return one line: of what, and how often."""
+        rows = ", ".join(readable(row) for row in ca.vertsplit(self.expression))
+        return f"<Measurement '{self.name}': {rows} at {counted(len(self.weights), 'instant')}>"
 
     @property
     def size(self) -> int:

@@ -15,7 +15,11 @@ from ocp.checks.expressions import (
     element_names,
     refuse_foreign_symbols,
 )
+from ocp.checks.rich_text import counted
 from ocp.problem.portable import Portable
+
+# More names than so many are counted.
+_FEW = 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,6 +107,20 @@ class Model(Portable):
         for label, size in (("x_nominal", self.nx), ("u_nominal", self.nu)):
             what = f"model '{self.name}': {label}"
             object.__setattr__(self, label, check_nominal(getattr(self, label), size, what))
+
+    def __repr__(self) -> str:
+        """Return one line: what moves, and what moves it."""
+        sizes = ", ".join(
+            f"{counted(len(names), what)} ({', '.join(names)})"
+            for names, what in (
+                (self.x_names, "state"),
+                (self.u_names, "control"),
+                (self.z_names, "algebraic variable"),
+            )
+            if names and len(names) <= _FEW
+        ) or counted(self.nx, "state") + ", " + counted(self.nu, "control")
+        step = f", dt = {self.dt:g} s" if self.dt is not None else ""
+        return f"<Model '{self.name}': {sizes}{step}>"
 
     def _check_algebraic(self) -> None:
         """Check the algebraic equations and where their root is looked for."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp.checks.errors import ProblemError
+from ocp.checks.rich_text import counted, html_of
 from ocp.problem.algebraic import AlgebraicSolution, refuse_unsolvable
 from ocp.problem.called_functions import check_kinks
 from ocp.problem.constraint_rows import (
@@ -199,6 +200,26 @@ class OCP(Statement):
     def describe(self) -> str:
         """Return the problem in mathematics, for a person."""
         return describe(self)
+
+    def __repr__(self) -> str:
+        """Return one line; ``describe`` says the whole problem."""
+        parts = [
+            (len(self.constraints), "constraint"),
+            (len(self.unknowns), "unknown constant"),
+            (len(self.data), "measurement"),
+        ]
+        said = [counted(self.model.nx, "state"), counted(self.model.nu, "control")]
+        said += [counted(number, what) for number, what in parts if number]
+        time = f"{self.duration:g} s"
+        if self.has_free_time:
+            time = "free final time"
+        elif self.steps is not None:
+            time = counted(self.steps, "step")
+        return f"<OCP '{self.name}': {', '.join(said)}, {time}; describe() says it all>"
+
+    def _repr_html_(self) -> str:
+        """Return the problem in mathematics, for a notebook."""
+        return html_of(self.name, self.describe())
 
     # -- checks at construction -----------------------------------------------------
 

@@ -176,6 +176,10 @@ class Signal(Portable):
             )
         object.__setattr__(self, "samples", self.checked(self.samples))
 
+    def __repr__(self) -> str:
+        """Return one line: how many samples, and what is between them."""
+        return f"<Signal '{self.name}': samples {self.value.shape}, {self.hold}>"
+
     @property
     def value(self) -> np.ndarray:
         """The samples, (N + 1, m)."""

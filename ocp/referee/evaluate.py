@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_positive
 from ocp.checks.interrupts import interruptible
+from ocp.checks.rich_text import html_of
 from ocp.expressions.foreign_functions import without_derivatives
 from ocp.normal_form.normal_form import normal_form
 from ocp.problem.end_of_definition import end_of_definition
@@ -16,6 +17,7 @@ from ocp.referee.memory import remembered
 from ocp.referee.reference_trajectory import ReferenceTrajectory, Replay, adjoint
 from ocp.referee.segments import defects, gaps, growth, worth
 from ocp.referee.stationarity import final_costate, stationarity
+from ocp.referee.verdict_in_words import verdict_facts, verdict_in_words
 from ocp.referee.violation import invariant_drift, largest_violation, peaks
 from ocp.solution.composite import CompositeSolution, V
 from ocp.solution.control_rate import price_of_rates
@@ -70,6 +72,14 @@ class Evaluation:
     growth: float | None
     resolution: float
     truth: ReferenceTrajectory
+
+    def __repr__(self) -> str:
+        """Return one line: what the controls cost, violate and leave unoptimised."""
+        return f"<Evaluation: {verdict_in_words(self)}>"
+
+    def _repr_html_(self) -> str:
+        """Return the numbers, for a notebook."""
+        return html_of("Evaluation", facts=verdict_facts(self, self.stationarity))
 
 
 @overload

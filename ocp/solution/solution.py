@@ -1,6 +1,6 @@
 """What a solver returns: a trajectory, its costates, and how it was found."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
@@ -13,9 +13,13 @@ from scipy.interpolate import PPoly
 
 from ocp.checks.arguments import check_instance, check_numeric
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.checks.rich_text import html_of
 from ocp.files.archive import made_of, write_archive
 from ocp.minimum_principle.necessary_conditions import minimum_principle
 from ocp.normal_form.normal_form import NormalForm, normal_form
+from ocp.plotting.compare import compared
+from ocp.plotting.plottable import Pictured
+from ocp.plotting.view import View
 from ocp.problem.constraint import Constraint
 from ocp.problem.data_residuals import data_residuals
 from ocp.problem.fingerprint import fingerprint_entries
@@ -30,7 +34,7 @@ from ocp.solution.status import Status
 from ocp.solution.work import Work
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from ocp.plotting.picture import Picture
 
 ControlKind = Literal["held", "linear", "polynomial", "extremal"]
 _KINDS = get_args(ControlKind)
@@ -147,6 +151,23 @@ class Solution:
             f"<Solution of '{self.problem.name}': {self.status.name}, cost {self.cost:.6g}, "
             f"{self.iterations} iterations, {len(self.t) - 1} intervals{self._hint}>"
         )
+
+    def _repr_html_(self) -> str:
+        """Return what was found in numbers, for a notebook."""
+        constants = [
+            (name, np.array2string(np.asarray(v), precision=6)) for name, v in self.unknowns.items()
+        ]
+        facts = [
+            ("status", self.status.words),
+            ("message", self.message or "-"),
+            ("cost, the solver's own", f"{self.cost:.9g}"),
+            ("duration [s]", f"{self.duration:.6g}"),
+            *constants,
+            ("solver", self.solver),
+            ("iterations, intervals", f"{self.iterations}, {len(self.t) - 1}"),
+            ("time to build and solve [s]", f"{self.build_time:.3g}, {self.solve_time:.3g}"),
+        ]
+        return html_of(f"Solution of {self.problem.name}", facts=facts)
 
     @property
     def _hint(self) -> str:
@@ -377,12 +398,55 @@ class Solution:
 
     # -- pictures and files --------------------------------------------------------
 
-    def plot(self) -> "Figure":
-        """Return a figure of states, controls, costates and constraints over time."""
-        # matplotlib takes a second to import: only who plots waits
-        from ocp.plotting.solution import plot_solution
+    def plot(
+        self,
+        variables: Sequence[str] = (),
+        *,
+        compare: "Solution | Mapping[str, Solution] | None" = None,
+        against: str = "time",
+        time_unit: str = "s",
+        constraints: str = "active",
+        costates: bool = False,
+        plane: Sequence[str] | None = None,
+    ) -> "Picture":
+        """Return a picture: a panel for each variable, with its bounds, references and data.
 
-        return plot_solution(self)
+        Variables with the same unit and a like size share a panel. Limits are hatched; path
+        constraints of a single variable are limits of it, others have panels of their own. A
+        signal that the running cost compares with a variable is drawn as its reference.
+
+        Args:
+            variables: names of what is drawn, in this order: states, algebraic variables,
+                controls, ``"rate of u"``, signals, constraints, measurements, invariants, or
+                costates ``"∂J/∂(x)"``. Empty: everything but costates and invariants.
+            compare: another solution, or several by name: ``{"warm": other}``. Their problems
+                may differ, the names of their states and controls may not.
+            against: name of what is on the horizontal axis.
+            time_unit: ``"ms"``, ``"s"``, ``"min"``, ``"h"`` or ``"d"``.
+            constraints: which path constraints have a panel: the ``"active"`` ones, that is those
+                that come to a limit, ``"all"`` or ``"none"``.
+            costates: whether they are drawn as well.
+            plane: two names ``(x, y)``: one picture of y over x instead, a phase plane.
+
+        Returns:
+            a matplotlib ``Figure``; ``picture["speed"]`` are the axes that show the speed. The
+            cost in its title is the solver's own; only ``evaluate`` says what the controls do.
+
+        Raises:
+            ProblemError: if a name is of nothing, a unit is none, or problems do not compare.
+        """
+        # matplotlib takes a second to import: only who plots waits
+        from ocp.plotting.plot import plot
+
+        view = View(variables, against, time_unit, constraints, costates)
+        shown = compared(self, compare, Solution, "a Solution")
+        return plot({label: s._pictured for label, s in shown.items()}, view, plane)
+
+    @property
+    def _pictured(self) -> Pictured:
+        """What a picture says of it."""
+        name = self.problem.name
+        return Pictured(name, self.status, self.message, self.cost, self.unknowns, (self,), (name,))
 
     def save(self, path: str | Path) -> Path:
         """Write everything to one ``.npz`` file, the problem as its ``probe``; return its path.

@@ -185,6 +185,16 @@ class BuiltProgram(Program):
     solver: Solver
     ocp: OCP
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Give every program the same one line, instead of all fields."""
+        super().__init_subclass__(**options)
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = BuiltProgram.__repr__
+
+    def __repr__(self) -> str:
+        """Return one line: of which problem, by which method."""
+        return f"<Program of '{self.ocp.name}' by {type(self.solver).__name__}>"
+
     def __reduce__(self) -> tuple[Callable[..., Program], tuple[Solver, OCP]]:
         """Return what builds it again."""
         return _built, (self.solver, self.ocp)

@@ -44,3 +44,24 @@ class Status(Enum):
     def is_success(self) -> bool:
         """Whether the trajectory meets the first-order conditions of the problem."""
         return self in (Status.SOLVED, Status.STATIONARY)
+
+    @property
+    def words(self) -> str:
+        """How it ended in a few plain words, for a title."""
+        return _WORDS.get(self, self.name.lower().replace("_", " "))
+
+
+_WORDS = {
+    Status.SOLVED: "solved",
+    Status.STATIONARY: "stationary (first-order conditions hold)",
+    Status.MYOPIC: "best step by step, not as a whole",
+    Status.SMALL_DECREASE: "not converged: the cost fell too little",
+    Status.COST_ROSE: "not converged: the cost rose",
+    Status.ITERATION_LIMIT: "not converged: too few iterations",
+    Status.TIME_LIMIT: "not converged: out of time",
+    Status.NO_PROGRESS: "not converged: no step helps",
+    Status.DIVERGED: "failed: the iterates blew up",
+    Status.INACCURATE: "not accurate: too few intervals",
+    Status.INFEASIBLE: "infeasible: the constraints are not met",
+    Status.FAILED: "failed",
+}

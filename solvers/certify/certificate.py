@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ocp import Solution
+from ocp.internal import html_of
 
 AGREEMENT, CONVEXITY, STARTS = "agreement", "convexity", "other starts"
 _MOST_DIGITS = 16.0
@@ -76,6 +77,10 @@ class Estimate:
     violation: float
     solution: Solution
     sentence: str
+
+    def __repr__(self) -> str:
+        """Return one line: the method and its value."""
+        return f"<Estimate by {self.method}: {self.cost:.9g} +- {self.error:.1e}>"
 
     @property
     def is_extremal(self) -> bool:
@@ -154,6 +159,17 @@ class Certificate:
             replace(c, decisive=False) if agree and c.name == AGREEMENT else c for c in self.checks
         )
         return replace(self, checks=(*checks, derivation))
+
+    def __repr__(self) -> str:
+        """Return one line: whether it holds, and of what value; ``print`` shows the evidence."""
+        lower, upper = self.interval
+        word = "certified" if self.holds else "NOT certified"
+        span = f"{self.cost:.9g} in [{lower:.9g}, {upper:.9g}]"
+        return f"<Certificate of '{self.problem}': {word}, {span}>"
+
+    def _repr_html_(self) -> str:
+        """Return the whole certificate, for a notebook."""
+        return html_of(f"Certificate of {self.problem}", str(self))
 
     def __str__(self) -> str:
         """Return the whole certificate as text."""

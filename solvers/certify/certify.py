@@ -1,12 +1,20 @@
 """Certify an optimal value: independent methods, and every condition that can be checked."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
 
-from ocp import PhasesSolution, Solution, Status, UnsupportedProblem, evaluate
+from ocp import (
+    Interrupted,
+    PhasesSolution,
+    Progress,
+    Solution,
+    Status,
+    UnsupportedProblem,
+    evaluate,
+)
 from ocp.internal import (
     InNormalForm,
     check_flag,
@@ -14,6 +22,7 @@ from ocp.internal import (
     check_positive,
     check_whole,
     normal_form,
+    told,
 )
 from solvers.certify.by_arcs import by_arcs
 from solvers.certify.certificate import (
@@ -51,6 +60,8 @@ from solvers.direct.multiple_shooting import MultipleShooting
 
 # So many independent methods are compared.
 _METHODS = 2
+# What a certificate begins one after the other: a direct answer, methods and groups of checks.
+_STAGES = 6
 RELATIVE = "relative agreement"
 FEASIBILITY, SECOND_ORDER = "feasibility", "second order"
 AS_WRITTEN = "as written"
@@ -95,10 +106,24 @@ class CertifyOptions:
 
 @dataclass(frozen=True)
 class _Clock:
-    """The time limit."""
+    """The time limit, and what is told on the way."""
 
     seconds: float
     begun: float
+    report: Progress
+    estimates: list[Estimate] = field(default_factory=list)
+    _stages: list[str] = field(default_factory=list)
+
+    @property
+    def known(self) -> str:
+        """The values that are known, in words."""
+        return ", ".join(f"{e.cost:.9g} by {e.method.partition(',')[0]}" for e in self.estimates)
+
+    def begin(self, stage: str) -> None:
+        """Tell that a stage begins."""
+        said = f"{stage}; {self.known}" if self.estimates else stage
+        self.report(min(len(self._stages), _STAGES - 1), _STAGES, said)
+        self._stages.append(stage)
 
     @property
     def is_late(self) -> bool:
@@ -107,7 +132,10 @@ class _Clock:
 
     def checks(self, names: Sequence[str], make: Callable[[], Sequence[Check]]) -> list[Check]:
         """Make some checks, or return that there was no time for them."""
-        return [self.left_out(name) for name in names] if self.is_late else list(make())
+        if self.is_late:
+            return [self.left_out(name) for name in names]
+        self.begin(", ".join(names))
+        return list(make())
 
     def left_out(self, name: str) -> Check:
         """Return a check that was not made for lack of time."""
@@ -115,7 +143,10 @@ class _Clock:
 
 
 def certify(
-    solution: Solution | PhasesSolution, effort: CertifyOptions | None = None
+    solution: Solution | PhasesSolution,
+    effort: CertifyOptions | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> Certificate:
     """Certify the optimal value of the problem that a solution solves.
 
@@ -134,6 +165,7 @@ def certify(
         solution: near the optimum that is to be certified; of any method. Of ``Phases`` the
             certificate is that of all side by side, and its solution that one's.
         effort: default ``CertifyOptions()``.
+        progress: told before each method and check, with the values that are known.
 
     Returns:
         the certificate; it says itself whether it holds, and what was not checked.
@@ -141,19 +173,32 @@ def certify(
     Raises:
         UnsupportedProblem: if neither direct multiple shooting nor collocation solves the problem,
             or no method answers.
+        Interrupted: on Ctrl-C; its ``so_far`` are the estimates that were made.
     """
+    report = told(progress, "certify")
     effort = effort or CertifyOptions()
     if not isinstance(solution, PhasesSolution):
         check_instance(solution, Solution, "certify: solution")
     check_instance(effort, CertifyOptions, "certify: effort")
     if isinstance(solution, PhasesSolution):
-        found = certify(solution.whole, effort)
+        found = certify(solution.whole, effort, progress=progress)
         smooth = found.estimates[0].is_extremal
         return with_phases(found, solution, _SMOOTH_VIOLATION if smooth else _OTHER_VIOLATION)
     form = normal_form(solution.problem)
     if form is not None:
-        return _in_terms_of_the_user(solution, effort, InNormalForm(form))
-    clock = _Clock(effort.seconds, perf_counter())
+        return _in_terms_of_the_user(solution, effort, InNormalForm(form), progress)
+    clock = _Clock(effort.seconds, perf_counter(), report)
+    try:
+        found = _certified(solution, effort, clock)
+    except KeyboardInterrupt:
+        raise Interrupted("certify", tuple(clock.estimates)) from None
+    report(_STAGES, _STAGES, clock.known)
+    return found
+
+
+def _certified(solution: Solution, effort: CertifyOptions, clock: "_Clock") -> Certificate:
+    """Certify a problem in its normal form."""
+    clock.begin("a direct answer")
     coarse, stiff = _coarse(solution, effort)
     estimates, silent = _estimates(solution, coarse, clock)
     if not estimates:
@@ -178,10 +223,13 @@ def certify(
 
 
 def _in_terms_of_the_user(
-    solution: Solution, effort: CertifyOptions, rewriting: InNormalForm
+    solution: Solution,
+    effort: CertifyOptions,
+    rewriting: InNormalForm,
+    progress: Progress | None,
 ) -> Certificate:
     """Certify the normal form, and ask the referee for the problem as it is written."""
-    found = certify(rewriting.written(solution), effort)
+    found = certify(rewriting.written(solution), effort, progress=progress)
     estimates = [replace(e, solution=rewriting.answer(e.solution)) for e in found.estimates]
     best = estimates[0]
     verdict, normal = evaluate(best.solution), evaluate(found.solution)
@@ -232,7 +280,7 @@ def _estimates(
     Arcs are looked at, and doubled grids of direct shooting asked, only where another method
     is missing: the latter are the least accurate. Time ends the search once one has answered.
     """
-    found: list[Estimate] = []
+    found = clock.estimates
     silent: list[Check] = []
     methods: dict[str, Callable[[], Estimate]] = {
         "polish": lambda: by_polish(solution),
@@ -253,12 +301,13 @@ def _estimates(
         if found and clock.is_late:
             silent.append(clock.left_out(name))
             continue
+        clock.begin(name)
         try:
             found.append(method())
         except NoEstimateError as reason:
             silent.append(Check.skipped(name, str(reason)))
     found.sort(key=lambda estimate: (not estimate.is_extremal, estimate.error))
-    return found, silent
+    return list(found), silent
 
 
 def _piecewise(found: list[Estimate]) -> Solution:

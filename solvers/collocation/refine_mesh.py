@@ -3,10 +3,11 @@
 from dataclasses import dataclass, replace
 from math import ceil
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
-from ocp import Solution, Status, Work
+from ocp import Interrupted, Progress, Solution, Status, Work
 from ocp.internal import (
     ACCURACY,
     check_instance,
@@ -14,6 +15,7 @@ from ocp.internal import (
     check_whole,
     judged,
     rewriting_of,
+    told,
 )
 from solvers.collocation.collocation import Collocation
 from solvers.collocation.collocation_points import HIGHEST, LOWEST
@@ -72,6 +74,12 @@ class MeshRefinement:
     solution: Solution
     rounds: tuple[MeshRound, ...]
 
+    def __repr__(self) -> str:
+        """Return one line: how many rounds, and how far."""
+        error = f"{self.rounds[-1].error:.1e}" if self.rounds else "none"
+        status = self.solution.status.name
+        return f"<MeshRefinement: {len(self.rounds)} rounds, {status}, last error {error}>"
+
 
 def refine_mesh(
     start: Solution,
@@ -79,6 +87,7 @@ def refine_mesh(
     solver: Collocation | None = None,
     accuracy: float = 1e-8,
     rounds: int = 20,
+    progress: Progress | None = None,
 ) -> MeshRefinement:
     """Collocate again and again, on finer intervals or with higher degrees where it is needed.
 
@@ -99,6 +108,7 @@ def refine_mesh(
         solver: points, options, and the first mesh; default ``Collocation(intervals=10)``.
         accuracy: accepted error of an interval, see ``MeshRound``.
         rounds: meshes at most; ``INACCURATE`` if the last is still not fine enough.
+        progress: told after each round how many are done, of how many at most, and the error.
 
     Returns:
         the best solution and all rounds. A round that fails ends it; its reason stands in the
@@ -107,7 +117,9 @@ def refine_mesh(
     Raises:
         ProblemError: if an option is wrong.
         UnsupportedProblem: for a discrete-time model.
+        Interrupted: on Ctrl-C; its ``so_far`` are the rounds that were done.
     """
+    report = told(progress, "refine_mesh")
     check_whole(rounds, "refine_mesh: rounds")
     check_positive(accuracy, "refine_mesh: accuracy")
     check_instance(start, Solution, "refine_mesh: start")
@@ -115,12 +127,34 @@ def refine_mesh(
     check_instance(solver, Collocation, "refine_mesh: solver")
     if (rewriting := rewriting_of(start.problem)) is not None:
         written = rewriting.written(start)
-        found = refine_mesh(written, solver=solver, accuracy=accuracy, rounds=rounds)
+        options: Any = {"accuracy": accuracy, "rounds": rounds, "progress": progress}
+        found = refine_mesh(written, solver=solver, **options)
         return replace(found, solution=rewriting.answer(found.solution))
-    cells = _Cells.of(solver.mesh_of(start.problem))
-    solution, done, made, work, iterations = start, [], 0.0, Work(), 0
-    solve_time = 0.0
-    for _ in range(rounds):
+    done: list[MeshRound] = []
+    try:
+        made = _refined(start, solver, accuracy, rounds, done, report)
+    except KeyboardInterrupt:
+        raise Interrupted("refine_mesh", tuple(done)) from None
+    totals: dict[str, Any] = {
+        "work": sum((each.solution.work for each in done), Work()),
+        "iterations": sum(each.solution.iterations for each in done),
+        "solve_time": sum(each.solution.solve_time for each in done),
+    }
+    best = _best(start, done, accuracy).with_(build_time=made, **totals)
+    return MeshRefinement(judged(best, ACCURACY), tuple(done))
+
+
+def _refined(
+    start: Solution,
+    solver: Collocation,
+    accuracy: float,
+    rounds: int,
+    done: list[MeshRound],
+    report: Progress,
+) -> float:
+    """Add round after round to ``done``; return the time of all symbolic work [s]."""
+    cells, solution, made = _Cells.of(solver.mesh_of(start.problem)), start, 0.0
+    for k in range(rounds):
         begun = perf_counter()
         program = replace(solver, mesh=cells.mesh, accuracy=np.inf).prepare(start.problem)
         made += perf_counter() - begun
@@ -128,14 +162,13 @@ def refine_mesh(
         solution = program.run(x0=data.x0, t0=data.t0, parameters=start.parameters, guess=solution)
         errors = program.defects.errors(solution)
         done.append(MeshRound(cells.mesh, errors, solution))
-        work, iterations = work + solution.work, iterations + solution.iterations
-        solve_time += solution.solve_time
-        if not solution.status.is_success or done[-1].error <= accuracy:
+        finished = not solution.status.is_success or done[-1].error <= accuracy
+        said = f"error {done[-1].error:.1e} on {len(errors)} intervals"
+        report(k + 1, k + 1 if finished else rounds, said)
+        if finished:
             break
         cells = cells.finer(errors, accuracy)
-    totals = {"work": work, "iterations": iterations, "solve_time": solve_time}
-    best = _best(start, done, accuracy).with_(build_time=made, **totals)
-    return MeshRefinement(judged(best, ACCURACY), tuple(done))
+    return made
 
 
 def _best(start: Solution, done: list[MeshRound], accuracy: float) -> Solution:

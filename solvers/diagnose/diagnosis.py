@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ocp.internal import html_of
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 
@@ -37,6 +38,17 @@ class Diagnosis:
     def serious(self) -> tuple[Finding, ...]:
         """Errors and warnings, without advice."""
         return tuple(f for f in self.findings if f.severity is not Severity.ADVICE)
+
+    def __repr__(self) -> str:
+        """Return one line: what was found first; ``print`` shows everything."""
+        first = self.first
+        said = f"{first.cause.value} ({', '.join(first.where)})" if first else "nothing found"
+        more = len(self.findings) - 1
+        return f"<Diagnosis of '{self.problem}': {said}{f', and {more} more' * (more > 0)}>"
+
+    def _repr_html_(self) -> str:
+        """Return all findings, for a notebook."""
+        return html_of("Diagnosis", str(self))
 
     def __str__(self) -> str:
         """Return one numbered paragraph for each finding."""

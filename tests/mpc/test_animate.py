@@ -9,7 +9,7 @@ from PIL import Image, ImageSequence
 
 from models import PlanarArm, line, redundancy_ocp
 from ocp import MPC, Box, FeedbackLaw, Plant, PlantInput, ProblemError, Rollout, closed_loop
-from ocp.loop_plotting.animation import _controls_ahead, _sends_controls, _states_ahead
+from ocp.loop_plotting.plans import controls_ahead, sends_controls, states_ahead
 from solvers import IndirectShooting, MultipleShooting
 from tests.mpc.problems import cart
 
@@ -58,21 +58,21 @@ def test_a_loaded_rollout_and_a_law_have_no_plans(rollout: Rollout, tmp_path: Pa
 def test_what_is_ahead_is_the_rest_of_the_plan(rollout: Rollout) -> None:
     plan = rollout.decisions[1].plan
     assert plan is not None
-    t, x = _states_ahead(plan, 0.25)
+    t, x = states_ahead(plan, 0.25)
     np.testing.assert_allclose(t, [0.25, *np.arange(0.3, 1.15, DT)])
     np.testing.assert_allclose(x[1:], plan.x[2:])
     np.testing.assert_allclose(x[0], (plan.x[1] + plan.x[2]) / 2.0)
-    _, u = _controls_ahead(plan, 0.25)
+    _, u = controls_ahead(plan, 0.25)
     np.testing.assert_allclose(u[:-1], plan.u[1:])
-    for ahead in (_states_ahead, _controls_ahead):
+    for ahead in (states_ahead, controls_ahead):
         assert [len(part) for part in ahead(plan, 5.0)] == [0, 0]
 
 
 def test_planned_inputs_are_shown_where_controls_are_sent(rollout: Rollout) -> None:
-    assert _sends_controls(rollout)
+    assert sends_controls(rollout)
     free = replace(cart(), constraints=(), control_bounds=Box())
     curved = MPC(ocp=free, solver=IndirectShooting(), dt=DT, compiled=False)
-    assert _sends_controls(curved.run(Plant(ocp=free), [1.0, 0.0], 0.3))
+    assert sends_controls(curved.run(Plant(ocp=free), [1.0, 0.0], 0.3))
     arm, start = PlanarArm((1.0, 1.0, 1.0)), np.array([2.0, -1.0, -1.0])
     path = line(np.array(arm.end_effector(start)).ravel(), (-0.5, 0.0))
     ocp, plant = (
@@ -82,7 +82,7 @@ def test_planned_inputs_are_shown_where_controls_are_sent(rollout: Rollout) -> N
     mpc = MPC(
         ocp=ocp, solver=MultipleShooting(5), dt=DT, applied=PlantInput("rate"), compiled=False
     )
-    assert not _sends_controls(mpc.run(Plant(ocp=plant), start, 0.2))
+    assert not sends_controls(mpc.run(Plant(ocp=plant), start, 0.2))
 
 
 @pytest.mark.parametrize(

@@ -281,7 +281,7 @@ def test_a_rollout_is_drawn(tmp_path: Path) -> None:
     script = {0.2: lambda s: s.with_(u=s.u + 9.0)}
     mpc = MPC(ocp=cart(), solver=scripted(script), dt=DT)
     figure = mpc.run(Plant(ocp=cart()), START, 0.5).plot()
-    assert "1 shifted" in figure.get_suptitle()
+    assert "shifted (1 of 5)" in [t.get_text() for t in figure.legends[0].get_texts()]
     figure.savefig(tmp_path / "loop.png")
 
 
