@@ -104,6 +104,8 @@ def closed_loop(
             except ControlRefused as refusal:
                 journal.ended = str(refusal)
                 break
+            if isinstance(controller, PreparingController):
+                controller.prepare_next()
             ahead.append(decision.input)
             if k >= 0:
                 journal.advance(seen, decision, ahead.pop(0), dt)
