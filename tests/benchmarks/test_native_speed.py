@@ -1,8 +1,11 @@
 """``native-speed``: the layers of a control step."""
 
+import pytest
+
 from benchmarks.speed.native import layers, layers_table, races
 
 
+@pytest.mark.slow
 def test_a_step_contains_a_run_and_a_run_the_solve() -> None:
     race = next(race for race in races() if "short track" in race.name)
     found = layers(race, 5)

@@ -173,6 +173,7 @@ def test_a_warm_run_that_fails_is_not_made_twice(program, monkeypatch, solved) -
     assert found.cost == pytest.approx(by_phases(program, monkeypatch, x0=[0.7, -0.1]).cost)
 
 
+@pytest.mark.slow
 def test_a_scaled_problem_starts_from_its_earlier_plan(monkeypatch, solved) -> None:
     large, small = 1e4, 1e-3
     ocp = pushed(
