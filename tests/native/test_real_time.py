@@ -198,6 +198,7 @@ def test_a_missing_measurement_is_bridged(compensate: bool) -> None:
     assert mpc.step(x, 2 * DT).source is InputSource.REAL_TIME
 
 
+@pytest.mark.slow
 def test_rates_reach_it_through_the_normal_form() -> None:
     ocp = pendulum(rates=(Rate(U, -20.0, 20.0),), last_input=[0.0], constraints=())
     mpc = controller(ocp, real_time=True)

@@ -10,6 +10,7 @@ from models import cart_pole_upright
 from ocp import (
     OCP,
     Box,
+    Constraint,
     Guess,
     Model,
     Parameter,
@@ -144,7 +145,11 @@ def test_the_error_of_the_half_step_is_that_of_the_grid(program) -> None:
     assert account.node == node
 
 
-def test_a_start_outside_its_bounds_is_told_as_ever(program, monkeypatch) -> None:
+@pytest.mark.parametrize("as_row", [False, True])
+def test_a_start_outside_its_bounds_is_told_as_ever(program, monkeypatch, as_row) -> None:
+    if as_row:
+        slow_enough = Constraint("slow", X[1], lower=-0.9)
+        program = NATIVE.build(pushed(state_bounds=Box(), constraints=(slow_enough,)))
     base = program.run().or_raise()
     given = {"x0": [0.7, -1.5], "guess": base}
     quick, slow = program.run(**given), by_phases(program, monkeypatch, **given)
@@ -168,6 +173,7 @@ def test_a_warm_run_that_fails_is_not_made_twice(program, monkeypatch, solved) -
     assert found.cost == pytest.approx(by_phases(program, monkeypatch, x0=[0.7, -0.1]).cost)
 
 
+@pytest.mark.slow
 def test_a_scaled_problem_starts_from_its_earlier_plan(monkeypatch, solved) -> None:
     large, small = 1e4, 1e-3
     ocp = pushed(

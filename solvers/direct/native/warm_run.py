@@ -4,6 +4,7 @@ In a control loop nearly every run is one of these. What it does is what ``NlpRu
 start whose answer needs nothing else; of any other answer ``NlpRun`` takes over.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -11,7 +12,14 @@ from time import perf_counter
 import numpy as np
 
 from ocp import OCP, InitialGuess, Status, Work
-from ocp.internal import RunData, RunResult, ShiftedPlan, Transcription, start_violation
+from ocp.internal import (
+    RunData,
+    RunResult,
+    ShiftedPlan,
+    Transcription,
+    interruptible,
+    start_violation,
+)
 from solvers.direct.native.native_arrays import NativeArrays
 from solvers.direct.native.native_library import (
     NativeAccount,
@@ -50,7 +58,7 @@ class WarmRun:
         if ending == _SOLVED:
             account, report = library.account(), library.report()
             is_clean = self._is_right(account, report) and account.unmoved == 0.0
-            if is_clean and not start_violation(self._ocp, data):
+            if is_clean and not self._start_violation(self._ocp, data):
                 return self._result(data, report)
         return None if ending is None else WarmStart(None, ending, perf_counter() - started)
 
@@ -143,6 +151,12 @@ class WarmRun:
     @cached_property
     def _ocp(self) -> OCP:
         return self._transcription.ocp
+
+    @cached_property
+    def _start_violation(self) -> Callable[[OCP, RunData], str]:
+        """Rows of the start alone are called by CasADi, which forgets Ctrl-C."""
+        has_rows = bool(self._ocp.decided_by_start.any())
+        return interruptible(start_violation) if has_rows else start_violation
 
     @cached_property
     def _since_start(self) -> np.ndarray:
