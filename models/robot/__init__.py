@@ -23,6 +23,7 @@ from models.robot.payload import Payload
 from models.robot.robot import Robot
 from models.robot.tasks import InTime, OrientationTask, PoseTask, PositionTask, SpaceTask
 from models.robot.torque_ocp import TorqueAt, TorqueForm, torque_ocp
+from models.robot.tracked_motion import TrackedMotion, tracked_motion
 from models.robot.urdf import read_urdf
 
 __all__ = [
@@ -49,9 +50,11 @@ __all__ = [
     "SphereShape",
     "TorqueAt",
     "TorqueForm",
+    "TrackedMotion",
     "panda",
     "read_urdf",
     "resolve_file",
     "rotation_error",
     "torque_ocp",
+    "tracked_motion",
 ]

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from models.robot.description import Pose
 from models.robot.tree import homogeneous
 from ocp import ProblemError
-from ocp.internal import check_instance, check_not_negative, check_numbers
+from ocp.internal import Portable, check_instance, check_not_negative, check_numbers
 
 
 @dataclass(frozen=True, eq=False)
-class Payload:
+class Payload(Portable):
     """A rigid part fixed to a link.
 
     Args:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from models.robot.robot import Robot
 from models.robot.straight_motion import straight_motion
+from models.robot.torque_checks import check_parameters, checked_configuration, usable_limit
 from ocp import OCP, Box, Constraint, Guess, Model, Parameter, ProblemError, Rate, Signal
 from ocp.internal import (
     check_choice,
@@ -104,16 +105,19 @@ def torque_ocp(
     check_instance(robot, Robot, f"{name}: robot")
     check_choice(form, ("acceleration", "torque"), f"{name}: form")
     check_choice(torque_at, ("middle", "ends"), f"{name}: torque_at")
-    _check_parameters(robot, parameters, name)
+    check_parameters(robot, parameters, name)
     duration = check_positive(horizon, f"{name}: horizon")
     weight = check_not_negative(acceleration_weight, f"{name}: acceleration_weight")
-    ends = [_configuration(robot, q, f"{name}: {w}") for q, w in ((start, "start"), (goal, "goal"))]
+    ends = [
+        checked_configuration(robot, q, f"{name}: {w}")
+        for q, w in ((start, "start"), (goal, "goal"))
+    ]
     motion = _Motion(
         robot=robot,
         ends=(ends[0], ends[1]),
         horizon=duration,
-        effort=_limit(robot, robot.limits.effort, effort_share, f"{name}: effort"),
-        velocity=_limit(robot, robot.limits.velocity, velocity_share, f"{name}: velocity"),
+        effort=usable_limit(robot, robot.limits.effort, effort_share, f"{name}: effort"),
+        velocity=usable_limit(robot, robot.limits.velocity, velocity_share, f"{name}: velocity"),
         weight=weight,
         parameters=tuple(parameters),
         name=name,
@@ -280,43 +284,6 @@ class _Motion:
         return x, a, np.clip(efforts, -self.effort, self.effort)
 
 
-def _check_parameters(robot: Robot, parameters: Sequence[Parameter | Signal], name: str) -> None:
-    """Refuse what has no value at run time."""
-    for entry in parameters:
-        check_instance(entry, (Parameter, Signal), f"{name}: an entry of parameters")
-    known = {s.element_hash() for entry in parameters for s in ca.vertsplit(entry.symbol)}
-    unknown = [] if robot.payload is None else ca.vertsplit(robot.payload.symbols)
-    for symbol in unknown:
-        if symbol.element_hash() not in known:
-            raise ProblemError(
-                f"{name}: parameters: in the robot, '{symbol}' is a symbol without a value: give "
-                f"parameters=[Parameter('{symbol}', {symbol}, value)]"
-            )
-
-
 def _moved(q: ca.SX, v: ca.SX, a: ca.SX, time: float) -> tuple[ca.SX, ca.SX]:
     """Return position and velocity after a time with a constant acceleration."""
     return q + time * v + time**2 / 2.0 * a, v + time * a
-
-
-def _configuration(robot: Robot, given: ArrayLike, what: str) -> np.ndarray:
-    q, limits = check_numbers(given, robot.n, what, repeat=False), robot.limits
-    for i in np.flatnonzero((q < limits.lower) | (q > limits.upper)):
-        raise ProblemError(
-            f"{what}: joint '{robot.joints[i]}' is at {q[i]:g}, outside its limits "
-            f"{limits.lower[i]:g} to {limits.upper[i]:g} {robot.units[i]}"
-        )
-    return q
-
-
-def _limit(robot: Robot, limits: np.ndarray, share: float, what: str) -> np.ndarray:
-    """Return the part of the limits that may be used, (n,)."""
-    part = check_positive(share, f"{what}_share")
-    if part > 1.0:
-        raise ProblemError(f"{what}_share = {part}, it must be at most 1")
-    for i in np.flatnonzero(limits == 0.0):
-        raise ProblemError(
-            f"{what}: the limit of joint '{robot.joints[i]}' is 0: some descriptions mean by it "
-            "that it is not known; write what it is, or leave it out"
-        )
-    return part * limits

@@ -65,7 +65,7 @@ def read_urdf(source: str | Path, *, tidy: float = 1e-9) -> Description:
 def _root(source: str | Path) -> Element:
     check_instance(source, (str, Path), "URDF: source")
     text = str(source)
-    if not text.lstrip().startswith("<"):
+    if isinstance(source, Path) or not ("<" in text or "\n" in text):
         path = Path(source)
         if not path.is_file():
             raise ProblemError(f"URDF: there is no file {path}")
@@ -76,7 +76,7 @@ def _root(source: str | Path) -> Element:
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     try:
         # As bytes: text that declares its own encoding would be refused.
-        parser.Parse(text.strip().encode(), True)
+        parser.Parse(text.strip("\ufeff \t\r\n").encode(), True)
     except expat.ExpatError as error:
         raise ProblemError(f"URDF: this is no XML: {error}") from error
     return builder.close()

@@ -25,6 +25,9 @@ def test_its_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
     np.testing.assert_allclose(moved.ravel(), [0.0, 0.2, 0.0], atol=1e-7)
     limit = 0.5 * robot.limits.effort + 1e-6
     assert (np.abs(names["torque"]) <= limit).all()
+    followed, surprise = names["followed"], names["surprise"]
+    assert followed.share.max() < 0.6  # half of it was planned
+    assert np.abs(followed.error).max() < 5e-3 < np.abs(surprise.error).max()
     assert "panda_joint7" in capsys.readouterr().out
 
 

@@ -165,6 +165,16 @@ def test_it_can_be_copied_to_other_processes(tree: Robot) -> None:
     )
 
 
+def test_with_a_payload_that_is_not_known_it_can_be_copied_too(tree: Robot) -> None:
+    mass = ca.SX.sym("mass")
+    robot = tree.carrying(Payload("left tool", mass))
+    rows = sample(tree)
+    expected = ca.Function("f", [mass], [robot.inverse_dynamics(*rows)])(2.0)
+    copy, symbol = pickle.loads(pickle.dumps((robot, robot.payload)))
+    found = ca.Function("f", [symbol.mass], [copy.inverse_dynamics(*rows)])(2.0)
+    np.testing.assert_array_equal(array(found), array(expected))
+
+
 def test_right_angles_written_with_few_digits_are_tidied() -> None:
     """The hip's is 1.5707963268; what moves is below what was rounded away."""
     tidy, exact = Robot.from_urdf(TREE), robot_of("tree")

@@ -61,6 +61,10 @@ def test_a_file_is_read_as_its_text(tmp_path: Path) -> None:
         ]
 
 
+def test_a_byte_order_mark_is_passed_over() -> None:
+    assert read_urdf("\ufeff" + TREE).name == "tree"
+
+
 def test_prefixes_that_nobody_declared_are_passed_over() -> None:
     text = HEAD + AB + BC + "<drake:diagram xyz:id='1'/></robot>"
     assert Robot.from_urdf(text).n == 2
@@ -88,6 +92,7 @@ def test_the_capsules_of_the_panda_are_kept() -> None:
         ("<sdf/>", "outermost element is <sdf>, <robot> is needed"),
         ("<robot/>", "there is no <link>; a xacro file has to be expanded"),
         ("no/such.urdf", "there is no file no/such.urdf"),
+        ("a text\nwithout XML" * 999, "this is no XML: syntax error"),
         ("<robot name='robot'><link/>", 'a link: <link> has no name="..."'),
         (HEAD + joint("j", "a", "b", kind="screw"), "joint 'j' has the type 'screw'; known are"),
         (HEAD + joint("j", "a", "b", kind="planar"), "'planar'; .*write two prismatic joints"),
