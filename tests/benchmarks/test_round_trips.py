@@ -33,6 +33,11 @@ from solvers import Collocation, MultipleShooting
 # Costs agree to this, relative to 1 + cost: interior points relax bounds by 1e-8.
 ALIKE = 1e-6
 INTERVALS = 40
+# Costates agree to this, relative to 1 + the largest.
+COSTATES_ALIKE = 1e-6
+# These poses leave the program as it is, row by row; others add unknowns: an interior point then
+# takes another way to bounds and inequalities that act, and stops elsewhere near them.
+SAME_PROGRAM = ("free start", "coupled ends")
 # Costs of problems whose optimum is so flat that a solver stops anywhere near it.
 FLAT = {"fuller": 1e-4, "pendulum-minimum-time": 1e-3}
 
@@ -157,6 +162,17 @@ def _agree(plain: Solution, posed: Solution, within: float) -> None:
     assert abs(evaluate(posed).cost - evaluate(plain).cost) <= 10 * within * size
 
 
+def _costates_agree(plain: Solution, posed: Solution) -> None:
+    assert posed.costate.shape == plain.costate.shape
+    apart = np.abs(posed.costate - plain.costate).max(initial=0.0)
+    assert apart <= COSTATES_ALIKE * (1.0 + np.abs(plain.costate).max(initial=0.0))
+
+
+def _has_inequalities(ocp: OCP) -> bool:
+    unequal = [np.not_equal(c.lower, c.upper).any() for c in ocp.constraints]
+    return any(unequal) or ocp.control_bounds.is_active or ocp.state_bounds.is_active
+
+
 def _guess(plain: Solution, posed: OCP) -> Guess:
     """The plain answer, so that of several optima it is the same one."""
     m, at = posed.model, np.linspace(0.0, 1.0, 101)
@@ -185,8 +201,13 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
             continue
         plain = solve(ocp, solver)
         if plain.status.is_success:
-            found = solve(posed, solver, guess=_guess(plain, posed))
+            guess = _guess(plain, posed)
+            found = solve(posed, solver, guess=guess)
             _agree(plain, found, FLAT.get(case.name, ALIKE))
+            if how in SAME_PROGRAM or not _has_inequalities(ocp):
+                # From the same guess: where multipliers are not unique, it decides which they are.
+                known = solve(ocp, solver, guess=replace(guess, unknowns={}))
+                _costates_agree(known, found)
 
 
 # Of the rate, relative to the size that its control has in a horizon.
