@@ -162,10 +162,9 @@ def _agree(plain: Solution, posed: Solution, within: float) -> None:
     assert abs(evaluate(posed).cost - evaluate(plain).cost) <= 10 * within * size
 
 
-def _costates_agree(plain: Solution, posed: Solution) -> None:
-    assert posed.costate.shape == plain.costate.shape
-    apart = np.abs(posed.costate - plain.costate).max(initial=0.0)
-    assert apart <= COSTATES_ALIKE * (1.0 + np.abs(plain.costate).max(initial=0.0))
+def _costates_alike(one: Solution, other: Solution) -> bool:
+    apart = np.abs(one.costate - other.costate).max(initial=0.0)
+    return bool(apart <= COSTATES_ALIKE * (1.0 + np.abs(one.costate).max(initial=0.0)))
 
 
 def _has_inequalities(ocp: OCP) -> bool:
@@ -205,9 +204,11 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
             found = solve(posed, solver, guess=guess)
             _agree(plain, found, FLAT.get(case.name, ALIKE))
             if how in SAME_PROGRAM or not _has_inequalities(ocp):
-                # From the same guess: where multipliers are not unique, it decides which they are.
+                # From the same guess, and where the problem itself has the same ones once more:
+                # multipliers of a state constraint of second order (beam) are never settled.
                 known = solve(ocp, solver, guess=replace(guess, unknowns={}))
-                _costates_agree(known, found)
+                assert found.costate.shape == known.costate.shape
+                assert _costates_alike(known, found) or not _costates_alike(known, plain)
 
 
 # Of the rate, relative to the size that its control has in a horizon.
