@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ocp import OCP, ProblemError, Solution
+from ocp import OCP, Phases, PhasesSolution, ProblemError, Solution, UnsupportedProblem
 from ocp.internal import RunData, normal_form
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.checks.activity import activity
@@ -95,7 +95,13 @@ def diagnose(asked: OCP | Solution, *, intervals: int = 50) -> Diagnosis:
 
     Raises:
         ProblemError: if ``asked`` is neither.
+        UnsupportedProblem: if it is made of phases.
     """
+    if isinstance(asked, Phases | PhasesSolution):
+        raise UnsupportedProblem(
+            "diagnose takes no phases: diagnose each by itself, with the states that a link "
+            "decides in its free_start; a solution of one phase is solution.phases[i]"
+        )
     if not isinstance(asked, OCP | Solution):
         raise ProblemError(f"diagnose takes an OCP or a Solution, not {type(asked).__name__}")
     subject = _subject(asked, MultipleShooting(intervals, max_iterations=_ITERATIONS))

@@ -1,5 +1,7 @@
 """``diagnose`` as a whole: order, text, solutions, bad input, the corpus."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from benchmarks.__main__ import main
 from benchmarks.mistakes import MISTAKES, SOUND
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.judge import GOAL, judged
-from ocp import Box, Euler, ProblemError, solve
+from ocp import Box, Euler, Phases, ProblemError, UnsupportedProblem, solve
 from solvers import Diagnosis, Finding, MultipleShooting, diagnose, polish
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Severity
@@ -102,6 +104,12 @@ def test_extremal_solution():
 def test_other_things_are_refused(wrong):
     with pytest.raises(ProblemError, match="takes an OCP or a Solution"):
         diagnose(wrong)
+
+
+def test_phases_are_refused_by_name():
+    both = of.cart(), replace(of.cart(), name="again", x0=[1.0, 0.0])
+    with pytest.raises(UnsupportedProblem, match="takes no phases: diagnose each by itself"):
+        diagnose(Phases("two carts", both))  # type: ignore[arg-type]
 
 
 def test_nothing_is_printed(capfd):

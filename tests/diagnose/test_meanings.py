@@ -9,7 +9,7 @@ import pytest
 from benchmarks.mistakes import problems as of
 from benchmarks.mistakes.wrong_constants import CONSTANTS, coasting_cart, periodic_cart
 from benchmarks.mistakes.wrong_meanings import MEANINGS
-from ocp import Box, Constraint, Measurement, Rate, Unknown
+from ocp import Box, Constraint, Measurement, Rate, Soft, Unknown
 from ocp.internal import normal_form
 from solvers import Finding, diagnose
 from solvers.diagnose.cause import Cause
@@ -108,7 +108,7 @@ def test_a_price_that_matters_is_no_finding():
     """The plant, with a price above the multiplier: met, so nothing is said."""
     planted = PLANTED["soft end at a price of nothing"].build()
     assert "by 1 without it" in first("soft end at a price of nothing").sentence
-    dear = tuple(replace(c, soft=replace(c.soft, linear=50.0)) for c in planted.constraints)
+    dear = tuple(replace(c, soft=Soft(linear=50.0)) for c in planted.constraints)
     found = diagnose(replace(planted, constraints=dear), intervals=20)
     assert Cause.CHEAP_SOFT not in {f.cause for f in found.findings}
 

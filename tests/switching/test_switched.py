@@ -260,9 +260,9 @@ def test_other_refusals():
     with pytest.raises(UnsupportedProblem, match="with blocks"):
         switched(fishing(), {"fishing": (0, 1)}, MultipleShooting(6, blocks=(2, 4)))
     with pytest.raises(ProblemError, match="the solver of a switched problem"):
-        switched(fishing(), {"fishing": (0, 1)}, Collocation(5))
+        switched(fishing(), {"fishing": (0, 1)}, Collocation(5))  # type: ignore[arg-type]
     with pytest.raises(ProblemError, match="switched: the problem"):
-        switched("lake", {"fishing": (0, 1)}, MultipleShooting(5))
+        switched("lake", {"fishing": (0, 1)}, MultipleShooting(5))  # type: ignore[arg-type]
 
 
 def test_a_parameter_of_the_name_is_no_trouble():
