@@ -25,7 +25,8 @@ SUITE = "library"
 # Polished until the cost changes by less, relative to 1 + cost.
 ACCURACY = 1e-10
 # Collocation: the first mesh, fine enough for the ends of constrained arcs; the accepted defect.
-FIRST_MESH, DEFECT = Collocation(intervals=36), 1e-8
+_FIRST_INTERVALS, DEFECT = 36, 1e-8
+FIRST_MESH = Collocation(intervals=_FIRST_INTERVALS)
 
 
 def _grids(case: Case) -> tuple[int, int]:
@@ -61,7 +62,7 @@ def _indirect(case: Case, settings: Settings) -> Outcome:
 
 def _collocation(case: Case, settings: Settings) -> Outcome:
     instants = {float(time) for m in problem(case).data for time in np.asarray(m.times)}
-    first = replace(FIRST_MESH, intervals=max(FIRST_MESH.intervals, len(instants) + 1))
+    first = replace(FIRST_MESH, intervals=max(_FIRST_INTERVALS, len(instants) + 1))
     return judged(refine_mesh(_coarse(case), solver=first, accuracy=DEFECT).solution)
 
 

@@ -41,6 +41,13 @@ SAME_PROGRAM = ("free start", "coupled ends")
 # Costs of problems whose optimum is so flat that a solver stops anywhere near it.
 FLAT = {"fuller": 1e-4, "pendulum-minimum-time": 1e-3, "mountain-car": 1e-3}
 
+
+def _solvers(ocp: OCP) -> tuple[MultipleShooting, Collocation]:
+    """Return a direct method of each kind, with a node at every instant of data."""
+    instants = len({float(time) for m in ocp.data for time in np.asarray(m.times)})
+    return MultipleShooting(max(INTERVALS, instants + 1)), Collocation(max(16, instants + 1))
+
+
 Pose = Callable[[OCP], OCP | None]
 
 
@@ -78,7 +85,10 @@ def with_unknown_time(ocp: OCP) -> OCP | None:
         horizon=1.0,
         running_cost=total * stretched(ocp.running_cost),
         terminal_cost=stretched(ocp.terminal_cost),
-        constraints=tuple(replace(c, expression=stretched(c.expression)) for c in ocp.constraints),
+        constraints=tuple(
+            replace(c, expression=stretched(c.expression) * (total if c.at == "integral" else 1.0))
+            for c in ocp.constraints
+        ),
         unknowns=(Unknown("total", total, horizon.guess, horizon.lower, horizon.upper),),
     )
 
@@ -198,7 +208,7 @@ def test_posed_through_the_normal_form_it_has_the_same_answer(how: str, case: Ca
         pytest.skip("it has no such term")
     is_plain = normal_form(ocp) is None  # else it is rewritten anyway
     assert (normal_form(posed) is None) == (how == "free start" and is_plain)
-    for solver in (MultipleShooting(INTERVALS), Collocation(16)):
+    for solver in _solvers(ocp):
         if ocp.model.is_discrete and isinstance(solver, Collocation):
             continue
         plain = solve(ocp, solver)
@@ -253,7 +263,7 @@ def test_with_rates_it_is_the_problem_with_a_larger_state(case: Case) -> None:
     if both is None:
         pytest.skip("no control in continuous time, a free start, rates, or algebraic variables")
     posed, by_hand = both
-    for solver in (MultipleShooting(INTERVALS), Collocation(16)):
+    for solver in _solvers(posed):
         hand = solve(by_hand, solver)
         if hand.status.is_success:
             m = posed.model
@@ -274,14 +284,15 @@ def test_with_a_peak_it_is_the_problem_with_a_constant_above(case: Case) -> None
         pytest.skip("it has no control, or constants already")
     size = 1.0 + float(np.abs(ocp.start()).max())
     rows = ocp.model.x / size
-    posed = replace(ocp, peaks=(Peak("reach", rows),))
+    posed = replace(ocp, peaks=(*ocp.peaks, Peak("reach", rows)))
     by_hand = replace(
         ocp,
         terminal_cost=ca.SX(ocp.terminal_cost) + top,
         unknowns=(Unknown("top", top, 1.0),),
         constraints=(*ocp.constraints, Constraint("below", rows - top, upper=0.0)),
     )
-    hand = solve(by_hand, MultipleShooting(INTERVALS))
+    solver = _solvers(ocp)[0]
+    hand = solve(by_hand, solver)
     if hand.status.is_success:
-        found = solve(posed, MultipleShooting(INTERVALS), guess=_guess(hand, posed))
+        found = solve(posed, solver, guess=_guess(hand, posed))
         assert found.cost == pytest.approx(hand.cost, rel=FLAT.get(case.name, ALIKE), abs=ALIKE)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -95,7 +96,7 @@ def test_the_string_keeps_off_the_second_disc() -> None:
 
 
 def spent(t: float) -> float:
-    rate = brentq(
+    rate: Any = brentq(
         lambda k: (
             quad(lambda s: np.exp(-s / 20.0) * (100.0 + k * np.exp(-s / 40.0)), 0, 10)[0] - 100.0
         ),
@@ -162,7 +163,8 @@ def least_jerk() -> float:
 def least_excursion() -> float:
     """The wall before which the least effort, 4/(9 l), is the budget."""
     budget = 4.0
-    return float(brentq(lambda wall: 4.0 / (9.0 * wall) - budget, 0.01, 1.0 / 6.0, xtol=1e-15))
+    root: Any = brentq(lambda wall: 4.0 / (9.0 * wall) - budget, 0.01, 1.0 / 6.0, xtol=1e-15)
+    return float(root)
 
 
 ROOTS: dict[str, Callable[[], float]] = {
