@@ -261,7 +261,10 @@ def test_a_control_loop_acts_as_with_ipopt() -> None:
 
 
 # What ends elsewhere at 20 intervals: in another local minimum, or without a success of either.
-ELSEWHERE = ("cart-pole-swing-up", "hypersensitive", "linear-hypersensitive")
+ELSEWHERE = (
+    "cart-pole-swing-up", "hypersensitive", "linear-hypersensitive", "hang-glider",
+    "periodic-algae",
+)  # fmt: skip
 # What the native solver hands over at 20 intervals.
 BY_IPOPT: tuple[str, ...] = ()
 LIBRARY = [
