@@ -140,11 +140,10 @@ class MPC:
     _inside: int | None = field(default=None, init=False, repr=False)
 
     def __repr__(self) -> str:
-        """Return one line: of what, by what, and how often."""
+        """Return one line: of what, by what, how often, and what it falls back on."""
         late = f", delay {self.delay:g} s" if self.delay else ""
-        return (
-            f"<MPC of '{self.ocp.name}' by {type(self.solver).__name__}, dt = {self.dt:g} s{late}>"
-        )
+        by = f"{type(self.solver).__name__}, dt = {self.dt:g} s{late}"
+        return f"<MPC of '{self.ocp.name}' by {by}, backup_law={self.backup_law}>"
 
     def __post_init__(self) -> None:
         """Check the options, do all symbolic work, and begin without a plan."""

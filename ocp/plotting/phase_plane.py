@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
-from ocp.plotting.picture import COLOURS, Picture, finite_range, legend, write_title
+from ocp.plotting.picture import COLOURS, Picture, finite_range, legend, wrapped, write_title
 from ocp.plotting.run import Run
 from ocp.plotting.solution import styles
 from ocp.plotting.view import named
@@ -41,8 +41,8 @@ def plot_plane(
     first = pairs[0]
     for axis, curve in zip(("x", "y"), first, strict=True):
         _limit(ax, axis, curve, [pair[axis == "y"] for pair in pairs])
-    ax.set_xlabel(first[0].label)
-    ax.set_ylabel(first[1].label)
+    ax.set_xlabel(wrapped(first[0].label, 60))
+    ax.set_ylabel(wrapped(first[1].label, 40))
     if first[0].unit and first[0].unit == first[1].unit:
         ax.set_aspect("equal", adjustable="box")
     ax.grid(alpha=0.25, linewidth=0.6)

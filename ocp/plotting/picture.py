@@ -88,7 +88,7 @@ def name_axis(axes: Sequence[Axes], label: str) -> None:
     """Write what the horizontal axis is under the lowest axes of each column."""
     rows = axes[0].get_gridspec().nrows  # type: ignore[union-attr]
     for ax in {*axes[rows - 1 :: rows], axes[-1]}:
-        ax.set_xlabel(label)
+        ax.set_xlabel(wrapped(label, 60))
 
 
 def write_title(picture: Picture, title: str, *, is_good: bool) -> None:
@@ -117,7 +117,11 @@ def legend(axes: Axes) -> None:
 
 
 def wrapped(text: str, width: int = _LINE) -> str:
-    """Return a text in lines that are not longer than ``width``, where its words allow it."""
+    """Return a text in lines that are not longer than ``width``, where its words allow it.
+
+    A dollar in a name is a dollar, and begins no formula.
+    """
+    text = text.replace("$", r"\$")
     lines = [textwrap.fill(line, width, break_long_words=False) for line in text.split("\n")]
     return "\n".join(lines)
 

@@ -10,7 +10,7 @@ from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
 from ocp.plotting.draw_panel import SOLID, Dashes, Drawn, Style, draw_panel
 from ocp.plotting.panels import Panel, panels_of
-from ocp.plotting.picture import COLOURS, Picture, laid_out, legend, name_axis, write_title
+from ocp.plotting.picture import COLOURS, Picture, laid_out, legend, name_axis, wrapped, write_title
 from ocp.plotting.run import Run
 from ocp.plotting.view import TIME_UNITS, Abscissa, View
 
@@ -104,7 +104,11 @@ def _name_runs(picture: Picture, runs: Mapping[str, Run]) -> None:
     each = styles(runs).values()
     handles = [Line2D([], [], color=s.colour, linestyle=s.line, linewidth=1.8) for s in each]
     picture.legend(
-        handles, list(runs), loc="outside lower center", ncols=min(len(runs), 4), frameon=False
+        handles,
+        [wrapped(name, 60) for name in runs],
+        loc="outside lower center",
+        ncols=min(len(runs), 4),
+        frameon=False,
     )
 
 
@@ -126,7 +130,7 @@ def _mark_phases(axes: Sequence[Axes], runs: Mapping[str, Run], seconds: float) 
         fits = all(room > _LETTER * len(n) for room, n in zip(rooms, first.phases, strict=True))
         for name, middle in zip(first.phases, (edges[1:] + edges[:-1]) / 2, strict=True):
             ax.annotate(
-                name, (middle, 1.0), (0, 10), xycoords=ax.get_xaxis_transform(),
+                wrapped(name, 60), (middle, 1.0), (0, 10), xycoords=ax.get_xaxis_transform(),
                 textcoords="offset points", ha="center" if fits else "left", va="bottom",
                 rotation=0 if fits else 40, fontsize="small", rotation_mode="anchor",
             )  # fmt: skip

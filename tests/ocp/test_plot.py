@@ -303,6 +303,16 @@ def test_what_cannot_be_drawn_is_said(cooled: Solution, options, said) -> None:
         cooled.plot(**options)
 
 
+def test_a_dollar_in_a_name_is_no_formula() -> None:
+    x, u = ca.SX.sym("cost $\\frac/h to $"), ca.SX.sym("u")
+    ocp = OCP(name="$ and $_", model=Model(name="m", x=x, u=u, f=u, x_units=("$_$",)), x0=[0.0],
+              horizon=1.0, running_cost=u**2, state_bounds=Box(-1, 1))  # fmt: skip
+    solution = trajectory(ocp, np.zeros((3, 1)))
+    other = {"$_{ and $": solution}
+    solution.plot(compare=other).savefig(io.BytesIO(), dpi=30)
+    solution.plot(plane=(str(x), "u"), compare=other).savefig(io.BytesIO(), dpi=30)
+
+
 def test_axes_that_are_not_there_are_said(cooled: Solution) -> None:
     with pytest.raises(ProblemError, match="'speed' is not drawn; what is: concentration"):
         cooled.plot()["speed"]
