@@ -159,7 +159,7 @@ def test_on_disk_with_and_without_breaks(tmp_path: Path) -> None:
 
 
 def test_plot_shows_the_curve() -> None:
-    lines = curved().plot().axes[1].get_lines()
+    lines = curved().plot()["u_0"].get_lines()
     assert len(np.asarray(lines[0].get_xdata())) > 100
 
 

@@ -73,12 +73,10 @@ def test_the_description_names_phases_and_what_couples_them():
 
 def test_a_figure_has_all_phases_on_one_clock():
     figure = FOUND.plot()
-    states = figure.axes[0]
-    assert states.get_xlim() == pytest.approx((0.0, 1.5))
-    assert [text.get_text() for text in states.texts] == ["fall", "rise"]
-    legend = states.get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["height", "speed"]
+    height = figure["height"]
+    assert height.get_xlim() == pytest.approx((0.0, 1.5))
+    assert [text.get_text() for text in height.texts] == ["fall", "rise"]
+    assert figure.names[:2] == ("height", "speed")
 
 
 def test_a_solution_starts_another_solver_and_another_chain():
