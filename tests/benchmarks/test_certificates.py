@@ -10,8 +10,8 @@ from benchmarks.cases.library.entry import certified
 from solvers.certify.certify import OTHER_DIGITS, SMOOTH_DIGITS
 
 ENTRIES = committed().entries
-# Without a certificate: references by derivation, by scipy (`tests/models/test_estimations.py`), or by
-# two families of points; polishing the estimations takes minutes.
+# Without a certificate: references by derivation, by scipy (tests/models/test_estimations.py), or
+# by two families of points; polishing the estimations takes minutes.
 UNCERTIFIED = {
     "alpha-pinene",
     "around-discs",
