@@ -47,3 +47,18 @@ def usable_limit(robot: Robot, limits: np.ndarray, share: float, what: str) -> n
             "that it is not known; write what it is, or leave it out"
         )
     return part * limits
+
+
+def check_time(
+    robot: Robot, way: np.ndarray, velocity: np.ndarray, horizon: float, name: str
+) -> None:
+    """Refuse a way (n,) that takes longer than the horizon even at the limit of velocity (n,)."""
+    needed = np.abs(way) / velocity
+    i = int(needed.argmax())
+    if needed[i] >= horizon:
+        unit = robot.units[i]
+        raise ProblemError(
+            f"{name}: horizon = {horizon:g} s is too short: joint '{robot.joints[i]}' has "
+            f"{abs(way[i]):.4g} {unit} to go, which takes {needed[i]:.4g} s at {velocity[i]:g} "
+            f"{unit}/s"
+        )

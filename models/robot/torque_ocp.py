@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike
 
 from models.robot.robot import Robot
 from models.robot.straight_motion import straight_motion
-from models.robot.torque_checks import check_parameters, checked_configuration, usable_limit
+from models.robot.torque_checks import (
+    check_parameters,
+    check_time,
+    checked_configuration,
+    usable_limit,
+)
 from ocp import OCP, Box, Constraint, Guess, Model, Parameter, ProblemError, Rate, Signal
 from ocp.internal import (
     check_choice,
@@ -98,7 +103,8 @@ def torque_ocp(
 
     Raises:
         ProblemError: if a configuration is outside the limits, or a joint has a limit of effort or
-            velocity of 0, naming the joint; or if options contradict each other.
+            velocity of 0, or the limit of velocity alone makes the horizon too short, naming the
+            joint; or if options contradict each other.
 
     Source: inverse dynamics as a path equation [Ferrolho et al. 2021]; limits in ``JointLimits``.
     """
@@ -112,12 +118,14 @@ def torque_ocp(
         checked_configuration(robot, q, f"{name}: {w}")
         for q, w in ((start, "start"), (goal, "goal"))
     ]
+    velocity = usable_limit(robot, robot.limits.velocity, velocity_share, f"{name}: velocity")
+    check_time(robot, ends[1] - ends[0], velocity, duration, name)
     motion = _Motion(
         robot=robot,
         ends=(ends[0], ends[1]),
         horizon=duration,
         effort=usable_limit(robot, robot.limits.effort, effort_share, f"{name}: effort"),
-        velocity=usable_limit(robot, robot.limits.velocity, velocity_share, f"{name}: velocity"),
+        velocity=velocity,
         weight=weight,
         parameters=tuple(parameters),
         name=name,

@@ -205,6 +205,10 @@ def test_the_panda_moves_from_the_default_guess_by_every_backend() -> None:
         ({"goal": [0.0, -3.1]}, "goal: joint 'elbow' is at -3.1, outside its limits"),
         ({"goal": [0.0]}, "goal has 1 entries, 2"),
         ({"horizon": 0.0}, "horizon = 0.0, it must be positive"),
+        (
+            {"horizon": 0.05},
+            "horizon = 0.05 s is too short: joint 'shoulder' has 1.5 rad to go, which takes 0.075",
+        ),
         ({"form": "force"}, "form = 'force' is neither acceleration nor torque"),
         ({"torque_at": "start"}, "torque_at = 'start' is neither middle nor ends"),
         ({"steps": 1}, "steps must be a whole number of at least 2"),
