@@ -10,7 +10,6 @@ from benchmarks.commands.loops import FAULTS, FOLLOWED, MPC
 from benchmarks.commands.mistakes import MISTAKES_COMMAND
 from benchmarks.commands.pages import PAGES
 from benchmarks.commands.peers import PEERS_COMMAND
-from benchmarks.commands.pictures import PICTURES
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
@@ -35,7 +34,6 @@ COMMANDS: tuple[Command, ...] = (
     MISTAKES_COMMAND,
     PEERS_COMMAND,
     PAGES,
-    PICTURES,
     ROOMS,
 )
 

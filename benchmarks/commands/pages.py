@@ -1,9 +1,7 @@
 """``pages``: run the code of the documentation's pages, and renew the pictures that they show."""
 
-import os
-import shutil
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
+from contextlib import chdir
 from tempfile import TemporaryDirectory
 
 from rich.console import Console
@@ -11,15 +9,14 @@ from rich.progress import track
 
 from benchmarks.commands.command import Command
 from benchmarks.commands.options import named
-from benchmarks.pages.page import DOCS, Page, difference, pages
+from benchmarks.pages.page import DOCS, Page, Shown, pages
+from benchmarks.pages.small_png import write_small
 
 _SHOWN = DOCS / "_static" / "pages"
 
 
 def _options(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="learn/1-first-problem, learn, ..."
-    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="learn, pictures, ...")
 
 
 def _run(options: Namespace, console: Console) -> int:
@@ -35,16 +32,14 @@ def _run(options: Namespace, console: Console) -> int:
 
 def _renewed(page: Page) -> list[str]:
     """Run a page, keep the pictures that it shows, and return what differs from what it says."""
-    found, before = [], Path.cwd()
-    with TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            found = [difference(step.said, text) for step, text in page.run() if step.said]
-            for picture in page.pictures:
-                shutil.copy(picture, _SHOWN / picture)
-        finally:
-            os.chdir(before)
-    return [said for said in found if said]
+    found = []
+    with TemporaryDirectory() as folder, chdir(folder):
+        for part in page.run():
+            if isinstance(part, Shown):
+                write_small(part.figure, _SHOWN / part.file)
+            elif part.difference:
+                found.append(part.difference)
+    return found
 
 
 PAGES = Command("pages", "run the code of the pages, renew their pictures", _options, _run)

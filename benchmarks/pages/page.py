@@ -1,4 +1,4 @@
-"""A page of the documentation: its code, step by step, and what each step is said to print."""
+"""A page of the documentation: its code, what it is said to print, and its pictures."""
 
 import re
 from collections.abc import Iterator
@@ -7,29 +7,62 @@ from dataclasses import dataclass
 from io import StringIO
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
 
 DOCS = Path(__file__).parents[2] / "docs"
-#: Folders of pages whose code runs from the first line to the last.
-FOLDERS = ("learn", "gallery")
-# A block of code, and the text behind it, which is what it prints.
-_STEP = re.compile(r"```python\n(.*?)```(?:\s*```text\n(.*?)```)?", re.DOTALL)
+#: Pages whose code runs from the first line to the last.
+WHERE = ("learn/*.md", "gallery/*.md", "pictures.md")
+# A block of code and the text behind it, which is what it prints; or a picture.
+_PART = re.compile(
+    r"```python\n(?P<code>.*?)```(?:\s*```text\n(?P<said>.*?)```)?"
+    r"|!\[[^]]*\]\((?:\.\./)?_static/pages/(?P<file>[\w.-]+)\)",
+    re.DOTALL,
+)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
-_PICTURE = re.compile(r"!\[[^]]*\]\((?:\.\./)?_static/pages/([\w-]+\.png)\)")
 # Numbers that a page shows may differ by this, relative and absolute, from machine to machine.
 _RELATIVE, _ABSOLUTE = 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
-class Step:
-    """One block of code.
+class Printed:
+    """What a block of code printed.
 
     Attributes:
-        code: Python.
-        said: what the page says that it prints; None: nothing is said.
+        text: what it printed.
+        said: what the page says that it prints; empty: nothing is said.
     """
 
-    code: str
-    said: str | None
+    text: str
+    said: str
+
+    @property
+    def difference(self) -> str:
+        """The first line of which the page says something else; empty: none.
+
+        Numbers within a thousandth are the same; "..." at the end of a line stands for anything.
+        """
+        if not self.said:
+            return ""
+        lines = (self.said.splitlines(), self.text.splitlines())
+        for said, printed in zip_longest(*lines, fillvalue=""):
+            if not _is_same(said.rstrip(), printed.rstrip()):
+                return f"the page says: {said}\nit prints:     {printed}"
+        return ""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture.
+
+    Attributes:
+        file: its name.
+        figure: what the code above it calls ``picture``.
+    """
+
+    file: str
+    figure: Figure
 
 
 @dataclass(frozen=True)
@@ -37,7 +70,7 @@ class Page:
     """A page whose code runs.
 
     Attributes:
-        name: folder and file without its ending, ``learn/1-first-problem``.
+        name: folder and file without its ending, ``learn/1-a-first-problem``.
         text: the page.
     """
 
@@ -45,41 +78,39 @@ class Page:
     text: str
 
     @property
-    def steps(self) -> tuple[Step, ...]:
-        """Its blocks of code."""
-        return tuple(Step(code, said or None) for code, said in _STEP.findall(self.text))
-
-    @property
     def pictures(self) -> tuple[str, ...]:
-        """Files that its code saves and that it shows."""
-        return tuple(_PICTURE.findall(self.text))
+        """Files of the pictures that it shows."""
+        return tuple(part["file"] for part in _PART.finditer(self.text) if part["file"])
 
-    def run(self) -> Iterator[tuple[Step, str]]:
-        """Run the code in the current folder; yield each step with what it printed."""
-        names: dict[str, object] = {"__name__": self.name}
-        for step in self.steps:
+    def run(self) -> Iterator[Printed | Shown]:
+        """Run the code in the current folder, as one program; yield what it prints and draws.
+
+        Raises:
+            TypeError: if ``picture`` is no figure where one is shown.
+        """
+        names: dict[str, Any] = {"__name__": self.name}
+        for part in _PART.finditer(self.text):
+            if part["file"]:
+                yield _shown(part["file"], names.get("picture"))
+                continue
             printed = StringIO()
             with redirect_stdout(printed):
-                exec(compile(step.code, self.name, "exec"), names)
-            yield step, printed.getvalue()
+                exec(compile(part["code"], self.name, "exec"), names)
+            yield Printed(printed.getvalue(), part["said"] or "")
 
 
 def pages() -> tuple[Page, ...]:
-    """Return all pages whose code runs, in the order of their names."""
-    files = [path for folder in FOLDERS for path in sorted((DOCS / folder).glob("*.md"))]
-    found = [Page(f"{f.parent.name}/{f.stem}", f.read_text(encoding="utf-8")) for f in files]
-    return tuple(page for page in found if page.steps)
+    """Return all pages whose code runs."""
+    files = [path for where in WHERE for path in sorted(DOCS.glob(where))]
+    return tuple(
+        Page(str(f.relative_to(DOCS).with_suffix("")), f.read_text(encoding="utf-8")) for f in files
+    )
 
 
-def difference(said: str, printed: str) -> str:
-    """Return the first line of which a page says something else than is printed; empty: none.
-
-    Numbers within a thousandth are the same; "..." at the end of a line stands for anything.
-    """
-    for is_said, is_printed in zip_longest(said.splitlines(), printed.splitlines(), fillvalue=""):
-        if not _is_same(is_said.rstrip(), is_printed.rstrip()):
-            return f"the page says: {is_said}\nit prints:     {is_printed}"
-    return ""
+def _shown(file: str, picture: Any) -> Shown:
+    if not isinstance(picture, Figure):
+        raise TypeError(f"{file}: picture is a {type(picture).__name__}, no figure")
+    return Shown(file, picture)
 
 
 def _is_same(said: str, printed: str) -> bool:
@@ -87,11 +118,10 @@ def _is_same(said: str, printed: str) -> bool:
         *words, last = _words(said.removesuffix("..."))
         others = _words(printed)[: len(words) + 1]
         return others[:-1] == words and others[-1].startswith(last)
-    pairs = zip(
-        map(float, _NUMBER.findall(said)), map(float, _NUMBER.findall(printed)), strict=False
-    )
-    near = all(abs(a - b) <= _RELATIVE * abs(a) + _ABSOLUTE for a, b in pairs)
-    return near and _words(said) == _words(printed)
+    if _words(said) != _words(printed):
+        return False
+    pairs = zip(*(map(float, _NUMBER.findall(line)) for line in (said, printed)), strict=True)
+    return all(abs(a - b) <= _RELATIVE * abs(a) + _ABSOLUTE for a, b in pairs)
 
 
 def _words(line: str) -> list[str]:
