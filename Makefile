@@ -15,6 +15,9 @@ PYTEST := $(BIN)/python -m pytest -n 0
 endif
 
 export MPLBACKEND ?= Agg
+# Workers fill the cores; the threads of linear algebra, of small matrices, would only wait for each other.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
 # Tests start many interpreters: without bytecode each would compile all it imports again.
 unexport PYTHONDONTWRITEBYTECODE
 
