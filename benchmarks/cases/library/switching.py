@@ -57,7 +57,9 @@ SWITCHING = (
         partial(goddard, fastest=0.1),
         "goddard-slow",
         computed(-1.0125763246569, 1e-11, f"{_ARCS}: full, singular, limit, none"),
-        BETWEEN,
+        # Refined collocation ends with an interval that is wrong by 1.6e-8 on the singular arc, and
+        # 1e-8 is asked; its cost is within 7e-8.
+        ("direct", "between"),
         "singular",
         "[Bonnans et al. 2017], after [Bryson & Ho 1975]",
         published=(Published(-1.01257, BONNANS),),
