@@ -27,7 +27,7 @@ _ROUNDING, _PRINTED = 1e-14, 1e-12
 def entry(
     build: Callable[[], OCP],
     name: str,
-    reference: Reference,
+    reference: Reference | None,
     families: tuple[Family, ...],
     difficulty: Difficulty,
     source: str,
@@ -61,16 +61,15 @@ def root(value: float, equations: str) -> Reference:
     return Reference(value, _PRINTED * max(1.0, abs(value)), f"closed form: {equations}")
 
 
-def certified(name: str) -> Reference:
+def certified(name: str) -> Reference | None:
     """Return the reference that ``python -m benchmarks certify`` wrote for a case.
 
-    Raises:
-        KeyError: if there is none.
-        ValueError: if the certificate does not hold.
+    None before it is written, and where the certificate does not hold: the case can be built,
+    so that it can be certified. The tests ask for one that holds.
     """
-    entry = committed().entries[name]
-    if not entry["holds"]:
-        raise ValueError(f"the certificate of '{name}' does not hold: no reference")
+    entry = committed().entries.get(name)
+    if entry is None or not entry["holds"]:
+        return None
     lower, upper = entry["interval"]
     methods = " and ".join(estimate["method"] for estimate in entry["estimates"])
     how = f"certified: {methods}, {entry['digits']:.1f} digits alike"
