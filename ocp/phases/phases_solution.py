@@ -1,10 +1,9 @@
 """A solution of phases: one of each, with what couples them."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,20 +14,16 @@ from ocp.phases.chain import Chain
 from ocp.phases.phases_evaluation import PhasesEvaluation, evaluate_phases
 from ocp.phases.side_by_side import SideBySide, side_by_side
 from ocp.phases.way_back import begun, phase_solutions
-from ocp.plotting.compare import compared
+from ocp.plotting.plot_method import Plottable
 from ocp.plotting.plottable import Pictured
-from ocp.plotting.view import View
 from ocp.problem.portable import without_caches
 from ocp.solution.composite import CompositeSolution
 from ocp.solution.solution import Solution
 from ocp.solution.status import Status
 
-if TYPE_CHECKING:
-    from ocp.plotting.picture import Picture
-
 
 @dataclass(frozen=True, eq=False)
-class PhasesSolution(CompositeSolution[PhasesEvaluation]):
+class PhasesSolution(CompositeSolution[PhasesEvaluation], Plottable):
     """What a solver returns for ``Phases``.
 
     Attributes:
@@ -39,6 +34,8 @@ class PhasesSolution(CompositeSolution[PhasesEvaluation]):
 
     side: SideBySide
     whole: Solution
+
+    _called: ClassVar[str] = "a solution of phases"
 
     @property
     def problem(self) -> Chain:
@@ -159,32 +156,6 @@ class PhasesSolution(CompositeSolution[PhasesEvaluation]):
     def with_(self, **changes: Any) -> "PhasesSolution":
         """Return a copy with some fields of ``whole`` replaced, such as status and message."""
         return replace(self, whole=self.whole.with_(**changes))
-
-    def plot(
-        self,
-        variables: Sequence[str] = (),
-        *,
-        compare: "PhasesSolution | Mapping[str, PhasesSolution] | None" = None,
-        against: str = "time",
-        time_unit: str = "s",
-        constraints: str = "active",
-        costates: bool = False,
-        plane: Sequence[str] | None = None,
-    ) -> "Picture":
-        """Return a picture of all phases, one after another; see ``Solution.plot``.
-
-        Phases are shaded in turn and named. What has the same name in two phases is one curve,
-        with the limits that each of them has.
-
-        Raises:
-            ProblemError: if a name is of nothing, a unit is none, or problems do not compare.
-        """
-        # matplotlib takes a second to import: only who plots waits
-        from ocp.plotting.plot import plot
-
-        view = View(variables, against, time_unit, constraints, costates)
-        shown = compared(self, compare, PhasesSolution, "a solution of phases")
-        return plot({label: s._pictured for label, s in shown.items()}, view, plane)
 
     @property
     def _pictured(self) -> Pictured:
