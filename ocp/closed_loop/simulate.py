@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,9 +23,9 @@ from ocp.closed_loop.decision import (
     PreparingController,
 )
 from ocp.closed_loop.delay import delay_steps
-from ocp.closed_loop.plant import Plant, RunningPlant
+from ocp.closed_loop.journal import Journal
+from ocp.closed_loop.plant import Plant
 from ocp.closed_loop.rollout import Rollout
-from ocp.problem.ocp import OCP
 
 SensorFault = Callable[[np.ndarray, float], np.ndarray]
 Observer = Callable[[np.ndarray, Decision | ControlRefused], None]
@@ -75,46 +75,22 @@ def closed_loop(
         Interrupted: on Ctrl-C; its ``so_far`` is the rollout until then.
     """
     report = told(progress, "closed loop")
-    check_instance(controller, Controller, "closed loop: controller")
-    check_instance(plant, Plant, "closed loop: plant")
-    for fault, what in ((sensors, "sensors"), (watch, "watch")):
-        if fault is not None:
-            check_callable(fault, f"closed loop: {what}")
-    check_positive(dt, "closed loop: dt [s]")
-    check_positive(duration, "closed loop: duration [s]")
+    _check(controller, plant, sensors, watch)
+    steps = _steps(duration, dt)
     check_whole(seed, "closed loop: seed", least=0)
-    steps = round(duration / dt)
-    if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
-        raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
-    box, m = plant.ocp.control_bounds, plant.ocp.model.nu
-    first = box.clip(np.zeros(m))
-    if initial_input is not None:
-        first = check_numbers(initial_input, m, "closed loop: initial_input")
+    first = _first_input(plant, initial_input)
     controller.reset(first)
     late = delay_steps(controller.delay, dt)
+    journal = Journal.begun(plant.ocp, plant.started(x0, seed), late)
     observer = _Observing(watch) if watch else None
-    journal = _Journal.begun(plant.ocp, plant.started(x0, seed), late)
-    ahead = [] if head_start else [first] * late
+    loop = _Loop(controller, dt, sensors, observer, journal, [] if head_start else [first] * late)
     try:
         for k in range(-late if head_start else 0, steps):
-            t = journal.running.t if k >= 0 else k * dt
-            measured = journal.running.measure()
-            seen = sensors(measured, t) if sensors else measured
-            try:
-                decision = _decided(controller, seen, t, plant.ocp, observer)
-            except ControlRefused as refusal:
-                journal.ended = str(refusal)
+            decision = loop.step(k)
+            if decision is None:
                 break
-            if isinstance(controller, PreparingController):
-                controller.prepare_next()
-            ahead.append(decision.input)
-            if k >= 0:
-                journal.advance(seen, decision, ahead.pop(0), dt)
-            report(
-                max(k + 1, 0),
-                steps,
-                f"t = {journal.running.t:.4g} s, {decision.source.name.lower()}",
-            )
+            said = f"t = {journal.running.t:.4g} s, {decision.source.name.lower()}"
+            report(max(k + 1, 0), steps, said)
             if not np.isfinite(journal.running.x).all():
                 journal.ended = "the plant's state blows up"
                 break
@@ -124,24 +100,93 @@ def closed_loop(
     return journal.rollout()
 
 
-def _decided(
-    controller: Controller, told: np.ndarray, t: float, plant: OCP, watch: "_Observing | None"
-) -> Decision:
-    """Run one step of the controller, and pass its decision or refusal to ``watch``."""
-    try:
-        decision = controller.step(told, t)
-    except ControlRefused as refusal:
-        if watch:
-            watch(told, refusal)
-        raise
-    if decision.input.shape != (plant.model.nu,):
-        raise ProblemError(
-            f"closed loop: the controller sends {decision.input.size} inputs, "
-            f"the plant '{plant.name}' takes {plant.model.nu}"
-        )
-    if watch:
-        watch(told, decision)
-    return decision
+def _check(
+    controller: Controller, plant: Plant, sensors: SensorFault | None, watch: Observer | None
+) -> None:
+    """Refuse what is none of these."""
+    check_instance(controller, Controller, "closed loop: controller")
+    check_instance(plant, Plant, "closed loop: plant")
+    for fault, what in ((sensors, "sensors"), (watch, "watch")):
+        if fault is not None:
+            check_callable(fault, f"closed loop: {what}")
+
+
+def _steps(duration: float, dt: float) -> int:
+    """Return how many intervals of dt [s] a duration [s] has."""
+    check_positive(dt, "closed loop: dt [s]")
+    check_positive(duration, "closed loop: duration [s]")
+    steps = round(duration / dt)
+    if steps < 1 or abs(steps * dt - duration) > 1e-6 * dt:
+        raise ProblemError(f"closed loop: {duration} s is no multiple of dt = {dt} s")
+    return steps
+
+
+def _first_input(plant: Plant, given: ArrayLike | None) -> np.ndarray:
+    """Return what acts until the first decision does (m,)."""
+    m = plant.ocp.model.nu
+    if given is None:
+        return plant.ocp.control_bounds.clip(np.zeros(m))
+    return check_numbers(given, m, "closed loop: initial_input")
+
+
+@dataclass(frozen=True, eq=False)
+class _Loop:
+    """A controller and a plant while they run.
+
+    Attributes:
+        controller: who decides.
+        dt: sampling interval [s].
+        sensors: what the controller is told of a measurement.
+        watch: what is told of each decision or refusal.
+        journal: the plant, and what is recorded of it.
+        ahead: inputs that are decided and do not act yet, the next one first.
+    """
+
+    controller: Controller
+    dt: float
+    sensors: SensorFault | None
+    watch: "_Observing | None"
+    journal: Journal
+    ahead: list[np.ndarray]
+
+    def step(self, k: int) -> Decision | None:
+        """Measure, decide, apply and record; before t = 0 (k < 0) the plant is kept.
+
+        None where the controller refuses; the journal then says why.
+        """
+        running = self.journal.running
+        t = running.t if k >= 0 else k * self.dt
+        measured = running.measure()
+        seen = self.sensors(measured, t) if self.sensors else measured
+        try:
+            decision = self._decided(seen, t)
+        except ControlRefused as refusal:
+            self.journal.ended = str(refusal)
+            return None
+        if isinstance(self.controller, PreparingController):
+            self.controller.prepare_next()
+        self.ahead.append(decision.input)
+        if k >= 0:
+            self.journal.advance(seen, decision, self.ahead.pop(0), self.dt)
+        return decision
+
+    def _decided(self, seen: np.ndarray, t: float) -> Decision:
+        """Run one step of the controller, and pass its decision or refusal to ``watch``."""
+        try:
+            decision = self.controller.step(seen, t)
+        except ControlRefused as refusal:
+            if self.watch:
+                self.watch(seen, refusal)
+            raise
+        plant = self.journal.ocp
+        if decision.input.shape != (plant.model.nu,):
+            raise ProblemError(
+                f"closed loop: the controller sends {decision.input.size} inputs, "
+                f"the plant '{plant.name}' takes {plant.model.nu}"
+            )
+        if self.watch:
+            self.watch(seen, decision)
+        return decision
 
 
 @dataclass(eq=False)
@@ -160,74 +205,3 @@ class _Observing:
             self.failed = True
             said = f"closed loop: {error}; the loop goes on and is watched no more"
             warnings.warn(said, RuntimeWarning, stacklevel=3)
-
-
-@dataclass(eq=False)
-class _Journal:
-    """What is recorded while a loop runs."""
-
-    ocp: OCP
-    running: RunningPlant
-    late: int
-    t: list[float]
-    x: list[np.ndarray]
-    measured: list[np.ndarray] = field(default_factory=list)
-    inputs: list[np.ndarray] = field(default_factory=list)
-    decisions: list[Decision] = field(default_factory=list)
-    costs: list[float] = field(default_factory=list)
-    violation: float = 0.0
-    worst: str = ""
-    ended: str = ""
-
-    @classmethod
-    def begun(cls, ocp: OCP, running: RunningPlant, late: int) -> "_Journal":
-        """Return the journal of a loop before its first step."""
-        return cls(ocp, running, late, [running.t], [running.x])
-
-    def advance(self, told: np.ndarray, decision: Decision, acting: np.ndarray, dt: float) -> None:
-        """Apply an input for an interval, and record it."""
-        cost, excess, worst = self.running.advance(acting, dt)
-        if excess > self.violation:
-            self.violation, self.worst = excess, worst
-        self.measured.append(np.array(told))
-        self.inputs.append(acting)
-        self.decisions.append(decision)
-        self.costs.append(cost)
-        self.t.append(self.running.t)
-        self.x.append(self.running.x)
-
-    def rollout(self) -> Rollout:
-        """Return what was recorded."""
-        steps = len(self.x) - 1  # of a step that was interrupted some lists may have an entry more
-        for entries in (self.measured, self.inputs, self.decisions, self.costs):
-            del entries[steps:]
-        t, x = np.array(self.t[: steps + 1]), np.array(self.x)
-        m = self.ocp.model
-        return Rollout(
-            plant=self.ocp,
-            t=t,
-            x=x,
-            measured=np.array(self.measured).reshape(steps, m.nx),
-            inputs=np.array(self.inputs).reshape(steps, m.nu),
-            sources=tuple(d.source for d in self.decisions),
-            messages=tuple(d.message for d in self.decisions),
-            costs=np.array(self.costs),
-            violation=self.violation,
-            violations=self.running.violations,
-            worst=self.worst,
-            drift=_drift(self.ocp, t, x),
-            step_times=np.array([d.time_used for d in self.decisions]),
-            clipped=np.array([d.clipped for d in self.decisions]),
-            ended=self.ended,
-            decisions=tuple(self.decisions),
-            late=self.late,
-        )
-
-
-def _drift(ocp: OCP, t: np.ndarray, x: np.ndarray) -> float:
-    """Largest violation of the invariants; their parameters are the declared ones."""
-    if not ocp.invariants:
-        return 0.0
-    p = ocp.parameter_values().at(0.0)[0]
-    rows = np.array([ocp.functions.invariants(*row, p) for row in zip(x, t, strict=True)])
-    return float(ocp.rows.invariants.excess(rows.reshape(len(t), -1)).max(initial=0.0))
