@@ -7,7 +7,7 @@ import pytest
 from benchmarks.cases import LIBRARY, PHASES, Case, PhasesCase
 from benchmarks.cases.library.certificates import COMMITTED, FORMAT, Certificates, committed
 from benchmarks.cases.library.entry import certified
-from solvers.certify.certify import OTHER_DIGITS, SMOOTH_DIGITS
+from solvers.certify.estimate_checks import OTHER_DIGITS, SMOOTH_DIGITS
 
 ENTRIES = committed().entries
 # Without a certificate: references by derivation, by scipy (tests/models/test_estimations.py), or

@@ -13,7 +13,7 @@ from models.textbook import bryson_denham, double_integrator_energy
 from ocp import OCP, Box, Guess, Model, ProblemError, UnsupportedProblem, evaluate, solve
 from solvers import Certificate, CertifyOptions, Collocation, MultipleShooting, certify
 from solvers.certify.certificate import CONVEXITY, STARTS, Estimate, Verdict
-from solvers.certify.certify import RELATIVE
+from solvers.certify.estimate_checks import RELATIVE
 from solvers.certify.estimates import NoEstimateError, by_polish
 from solvers.certify.global_evidence import EXTREMALS, every_extremal, other_starts
 from solvers.certify.grid_conditions import CHECKS as GRID
@@ -115,7 +115,7 @@ def test_what_there_was_no_time_for_is_not_checked():
 
 
 def test_where_no_method_answers_each_says_why(monkeypatch):
-    module = import_module("solvers.certify.certify")
+    module = import_module("solvers.certify.certify")  # the package has a function of that name
 
     def silent(_):
         raise NoEstimateError("it has nothing to say")
@@ -132,7 +132,7 @@ def test_where_no_method_answers_each_says_why(monkeypatch):
 def test_the_checks_that_there_was_no_time_for_are_named(monkeypatch):
     """The clock stands still until both methods have answered; the first asks for no time."""
     instants = chain([0.0] * 2, repeat(10.0))
-    module = import_module("solvers.certify.certify")  # the package has a function of that name
+    module = import_module("solvers.certify.effort")
     monkeypatch.setattr(module, "perf_counter", lambda: next(instants))
     start = solve(double_integrator_energy(), MultipleShooting(20))
     certificate = certify(start, CertifyOptions(starts=5, seconds=5.0))
