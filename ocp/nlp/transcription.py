@@ -12,25 +12,25 @@ from ocp.integration.differentiable_step import differentiable_step
 from ocp.integration.one_step import ExplicitIntegrator, Integrator, Stage
 from ocp.nlp.blocked_rows import held_rows, on_held_controls, rows_by_stage
 from ocp.nlp.start_slope import start_slope, step_with_fixed_start
+from ocp.nlp.unknowns_layout import UnknownsLayout
 from ocp.nlp.violated_row import most_violated
 from ocp.problem.constraint_rows import ConstraintRow, ConstraintRows
 from ocp.problem.control_blocks import ControlBlocks
 from ocp.problem.node_fractions import node_fractions, node_widths
-from ocp.problem.nominal_sizes import time_unit
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 
 
 @dataclass(frozen=True, eq=False)
-class Transcription:
+class Transcription(UnknownsLayout):
     r"""Multiple shooting: states at nodes, controls held, integration in between.
 
     .. math:: x_{k+1} - F(x_k, u_k) = 0, \quad k = 0 \dots N-1
 
-    Unknowns are ordered (z_0, u_0, z_1, u_1, ..., z_N), constraints stage by stage, so that
-    both a general sparse and a stagewise solver see their structure. A free final time is a
-    state T of z with T_{k+1} = T_k. Path constraints hold at the nodes; what the start alone
-    decides is not imposed there. The stage is built once and mapped.
+    Constraints are ordered stage by stage, as the unknowns are, so that both a general sparse and
+    a stagewise solver see their structure; a free final time adds T_{k+1} = T_k. Path constraints
+    hold at the nodes; what the start alone decides is not imposed there. The stage is built once
+    and mapped.
 
     Attributes:
         ocp: the problem.
@@ -44,8 +44,6 @@ class Transcription:
         blocks: controls that are held over several intervals, see ``blocked_rows``.
     """
 
-    ocp: OCP
-    intervals: int
     integrator: Integrator
     compiled: bool = False
     start_as_data: bool = False
@@ -56,23 +54,6 @@ class Transcription:
         """Refuse what is no problem; the numbers are checked by the solvers."""
         check_instance(self.ocp, OCP, "the problem to transcribe")
 
-    # -- layout -----------------------------------------------------------------------
-
-    @property
-    def n(self) -> int:
-        """Number of intervals."""
-        return self.ocp.steps or self.intervals
-
-    @property
-    def nz(self) -> int:
-        """States per node, the free final time included."""
-        return self.ocp.model.nx + int(self.ocp.has_free_time)
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return self.n * (self.nz + self.ocp.model.nu) + self.nz
-
     @property
     def fractions(self) -> np.ndarray:
         """Nodes as fractions of the horizon, (N + 1,)."""
@@ -81,56 +62,6 @@ class Transcription:
     @cached_property
     def _fractions(self) -> np.ndarray:
         return node_fractions(self.ocp, self.n) if self.nodes is None else self.nodes
-
-    def with_time(self, x: np.ndarray, duration: float) -> np.ndarray:
-        """Return z (N + 1, nz): states (N + 1, nx), with final time minus t0 [s] if it is free."""
-        unknown = np.full((len(x), int(self.ocp.has_free_time)), duration / self.time_unit)
-        return np.hstack([x, unknown])
-
-    def join(self, z: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the vector of unknowns of z (N + 1, nz) and u (N, nu)."""
-        return np.concatenate([np.hstack([z[:-1], u]).ravel(), z[-1]])
-
-    def iterate(self, x: np.ndarray, u: np.ndarray, duration: float) -> np.ndarray:
-        """Return the vector of unknowns of a trajectory.
-
-        Args:
-            x: states at the nodes (N + 1, nx).
-            u: controls of the intervals (N, nu).
-            duration: final time minus t0 [s]; it counts where the final time is free.
-        """
-        return self.join(self.with_time(x, duration), u)
-
-    def split(self, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return z (N + 1, nz) and u (N, nu) of a vector of unknowns."""
-        stages = w[: -self.nz].reshape(self.n, -1)
-        return np.vstack([stages[:, : self.nz], w[-self.nz :]]), stages[:, self.nz :]
-
-    @property
-    def is_control(self) -> np.ndarray:
-        """Which unknowns are controls, bool (size,)."""
-        return self._is_control
-
-    @cached_property
-    def _is_control(self) -> np.ndarray:
-        z, u = np.zeros((self.n + 1, self.nz)), np.ones((self.n, self.ocp.model.nu))
-        return self.join(z, u).astype(bool)
-
-    @property
-    def is_later_state(self) -> np.ndarray:
-        """Which unknowns are states after the start, bool (size,)."""
-        z = np.tile(np.arange(self.nz) < self.ocp.model.nx, (self.n + 1, 1)).astype(float)
-        z[0] = 0.0
-        return self.join(z, np.zeros((self.n, self.ocp.model.nu))).astype(bool)
-
-    def duration(self, w: np.ndarray) -> float:
-        """Return final time minus t0 [s] of a vector of unknowns."""
-        return float(w[-1]) * self.time_unit if self.ocp.has_free_time else self.ocp.duration
-
-    @cached_property
-    def time_unit(self) -> float:
-        """What a free final time is measured in [s]."""
-        return time_unit(self.ocp)
 
     # -- the stage ----------------------------------------------------------------------
 
