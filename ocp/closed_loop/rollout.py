@@ -263,8 +263,8 @@ class Rollout:
     def _of(cls, data: Mapping[str, np.ndarray], plant: OCP) -> "Rollout":
         """Return the rollout of an archive."""
         names = _names_of(data["outcomes"])
-        if not set(names) <= set(InputSource.__members__):
-            raise ProblemError("a source is none of the five")
+        if unknown := set(names) - set(InputSource.__members__):
+            raise ProblemError(f"a source is '{min(unknown)}', which is no rung")
         return cls(
             plant=plant,
             **{name: np.asarray(data[name], dtype=float) for name in _ARRAYS},
