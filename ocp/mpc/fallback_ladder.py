@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,43 +12,18 @@ from numpy.typing import ArrayLike
 from ocp.closed_loop.decision import Decision, InputSource, StepReport
 from ocp.mpc.backup_selection import Backup
 from ocp.mpc.controller_state import ControllerState
-from ocp.mpc.input_limits import InputLimits, Instant
+from ocp.mpc.input_limits import Instant
 from ocp.mpc.plan_check import ROUNDING, HorizonParameters, PlanCheck
-from ocp.mpc.plant_input import InputMap, PlantInput
+from ocp.mpc.plant_input import PlantInput
+from ocp.mpc.selected_input import InputSelector, Rung, SelectedInput
 from ocp.mpc.step_clock import StepClock
 from ocp.mpc.step_inputs import InputCollector, Parameters, StepInputs, joined
 from ocp.mpc.step_solver import SolvedStep, StepSolver, refusal
 from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.ocp import OCP
-from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
 from ocp.solution.solver import InitialGuess, Program
 from ocp.solution.status import Status
-
-
-class SelectedInput(NamedTuple):
-    """An input of a rung.
-
-    Attributes:
-        source: the rung.
-        input: within its bounds (m,).
-        clipped: by how much it was moved to lie there.
-        plan: that it comes from; None for the backup law.
-    """
-
-    source: InputSource
-    input: np.ndarray
-    clipped: float
-    plan: Solution | None
-
-    @property
-    def is_new(self) -> bool:
-        """Whether its plan was made at this step."""
-        return self.source not in (InputSource.SHIFTED, InputSource.BACKUP)
-
-
-# What a rung returns: its input or None, and what to report: of a failure why.
-Rung = tuple[SelectedInput | None, str]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,7 +136,7 @@ class FallbackLadder:
         if clock.is_over():
             why = clock.said if solved.plan is not None else ""
         elif solved.plan is not None:
-            selected, why = self._follow(solved.plan, now, _source_of(solved))
+            selected, why = self._selector.of_plan(solved.plan, now, _source_of(solved))
             if selected is not None:
                 return selected, why
         selected, reason = self._follow_shifted(state.plan, now, inputs.parameters)
@@ -198,7 +172,7 @@ class FallbackLadder:
         excess, worst = self._check.remainder(plan, now.x, now.t, p, to_its_end=to_its_end)
         if excess > self.tolerance:
             return None, f"the earlier plan: {worst}"
-        return self._follow(plan, now, InputSource.SHIFTED)
+        return self._selector.of_plan(plan, now, InputSource.SHIFTED)
 
     def _violate_least(
         self, inputs: StepInputs, state: ControllerState, solved: SolvedStep, now: Instant
@@ -221,9 +195,9 @@ class FallbackLadder:
             return None, why
         plan, violation = best
         if violation.largest <= self.tolerance:
-            selected, reason = self._follow(plan, now, InputSource.FEASIBLE)
+            selected, reason = self._selector.of_plan(plan, now, InputSource.FEASIBLE)
             return selected, reason or "another plan meets the constraints"
-        selected, reason = self._follow(plan, now, InputSource.LEAST_VIOLATING)
+        selected, reason = self._selector.of_plan(plan, now, InputSource.LEAST_VIOLATING)
         return selected, reason or f"no plan meets the constraints; {violation.worst}"
 
     def _back_up(self, last: np.ndarray | None, now: Instant) -> Rung:
@@ -234,38 +208,8 @@ class FallbackLadder:
         given, reason = self.backup.input(*now, size=size, last=last)
         if given is None:
             return None, reason
-        selected, problem = self._bounded(given, InputSource.BACKUP, now)
+        selected, problem = self._selector.bounded(given, InputSource.BACKUP, now)
         return selected, joined(reason, problem)
-
-    def _follow(self, plan: Solution, now: Instant, source: InputSource) -> Rung:
-        """Take the input that a plan has now."""
-        # A control that moves is held at its value in the middle of the interval, its mean but
-        # for second-order terms.
-        middle = 0.0 if plan.control_kind == "held" else 0.5 * self.dt
-        u = plan_controls(plan, now.t + middle)
-        rates = self.ocp.control_rates
-        if len(rates) and not self.ocp.model.is_discrete:
-            # Where the next plan begins: it may change by the whole rate in an interval.
-            u = u.copy()
-            u[rates.index] = plan_controls(plan, now.t + self.dt)[rates.index]
-        return self._bounded(self._input_map(now.x, u, now.t, now.p), source, now, plan)
-
-    def _bounded(
-        self, given: np.ndarray, source: InputSource, now: Instant, plan: Solution | None = None
-    ) -> Rung:
-        """Move an input into its limits; None if it is not finite, or a plan's and moved far."""
-        inside = self._input_limits.nearest(given, now)
-        if inside is given:
-            return SelectedInput(source, given.copy(), 0.0, plan), ""
-        # Not finite where the input is not.
-        excess = float((np.abs(given - inside) / self._input_sizes).max(initial=0.0))
-        if not isfinite(excess):
-            return None, f"the input {given} is not finite"
-        # One that moves is held at its mean, which a limit that moves may exclude by a little.
-        is_held = plan is not None and plan.control_kind == "held"
-        if is_held and excess > self.tolerance:
-            return None, f"the input {given} leaves its bounds by {excess:.3g}"
-        return SelectedInput(source, inside, excess, plan), self._input_limits.exceeded(inside, now)
 
     @cached_property
     def _inputs(self) -> InputCollector:
@@ -292,26 +236,16 @@ class FallbackLadder:
         )
 
     @cached_property
-    def _input_sizes(self) -> np.ndarray:
-        """What the input is measured in, (m,)."""
-        sizes = self.imposed.sizes if self.applied.what == "control" else None
-        return np.ones(self.applied.size(self.ocp)) if sizes is None else sizes.controls
-
-    @cached_property
     def _check(self) -> PlanCheck:
         return PlanCheck(self.ocp, self.dt, self.compiled, self.imposed)
 
     @cached_property
-    def _input_map(self) -> InputMap:
-        return self.applied.sending(self.ocp)
-
-    @cached_property
-    def _input_limits(self) -> InputLimits:
-        return InputLimits(self.ocp, self.applied, self.dt)
+    def _selector(self) -> InputSelector:
+        return InputSelector(self.ocp, self.imposed, self.dt, self.applied, self.tolerance)
 
     def prepare(self) -> None:
         """Build what a step may need, so that no step waits for it."""
-        self._input_limits.prepare()
+        self._selector.prepare()
 
     def prepare_step(
         self, state: ControllerState, parameters: Mapping[str, ArrayLike] | None
