@@ -97,6 +97,23 @@ class FallbackLadder:
             solver_raised=solved.raised or bool(broken),
             seen=inputs.seen,
         )
+        report = self._report(
+            inputs, solved, selected, reason, new_plan=new_plan, late=is_late, started=started
+        )
+        return report, after
+
+    def _report(
+        self,
+        inputs: StepInputs,
+        solved: SolvedStep,
+        selected: SelectedInput | None,
+        reason: str,
+        *,
+        new_plan: Solution | None,
+        late: bool,
+        started: float,
+    ) -> StepReport:
+        """Return what a step came to: a ``Decision`` where a rung holds."""
         # One object is made of it, not two: each costs a step a dozen frozen fields.
         report: dict[str, Any] = dict(
             t=inputs.t,
@@ -104,15 +121,15 @@ class FallbackLadder:
             status=solved.status,
             message=joined(solved.message, reason),
             residual=solved.plan.residual if solved.plan else np.inf,
-            late=is_late,
+            late=late,
             parameters=inputs.parameters.by_name if inputs.parameters_known else {},
             parameters_known=inputs.parameters_known,
             new_plan=new_plan,
             time_used=perf_counter() - started,
         )
         if selected is None:
-            return StepReport(**report), after
-        decision = Decision(
+            return StepReport(**report)
+        return Decision(
             **report,
             input=selected.input,
             source=selected.source,
@@ -120,7 +137,6 @@ class FallbackLadder:
             age=self._age(selected, inputs.applies_at),
             clipped=selected.clipped,
         )
-        return decision, after
 
     def _age(self, selected: SelectedInput, now: float) -> int:
         """Return how many steps ago the plan of an input was made."""
