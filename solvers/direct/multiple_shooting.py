@@ -22,8 +22,10 @@ from ocp.internal import (
     epigraph,
     least_violating,
     refuse_compiled,
+    switches,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
+from solvers.direct.native.native_batch import NativeBatch
 from solvers.direct.native.warm_run import WarmRun
 from solvers.direct.nlp_backends import NativeNlp, Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
@@ -229,6 +231,15 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     def seconds_in_c(self) -> float | None:
         """What the native backend's last run took, by its own clock [s]; None of other backends."""
         return self.nlp.run.library.report().seconds if isinstance(self.nlp, NativeNlp) else None
+
+    # -- many solves at once -----------------------------------------------------------------
+
+    @cached_property
+    def native_batch(self) -> NativeBatch | None:
+        """Many solves in C, where ``_warm_run`` is and nothing jumps; None: one by one."""
+        if not isinstance(self.nlp, NativeNlp) or self._warm_run is None or switches(self.ocp):
+            return None
+        return NativeBatch(self.nlp.run, self.solver.accuracy)
 
     # -- the first iterate -------------------------------------------------------------------
 

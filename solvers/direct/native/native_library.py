@@ -173,6 +173,20 @@ class NativeLibrary:
             begin = 0
         return ending
 
+    def roll_out(self, batch: ctypes.Structure, first: int, end: int) -> None:
+        """Integrate the controls of some solves of a batch, see ``batch.h``."""
+        self.library.native_roll_out(self._block, ctypes.byref(batch), first, end)
+
+    def solve_many(
+        self,
+        batch: ctypes.Structure,
+        options: "ctypes.Array[NativeOptions]",
+        first: int,
+        end: int,
+    ) -> None:
+        """Solve some of a batch, cold or warm with the options of either, see ``batch.h``."""
+        self.library.native_solve_many(self._block, ctypes.byref(batch), options, first, end)
+
     def read_bounds(self) -> None:
         """Take over what is in ``low``, ``up``, ``x_given`` and ``u_given``."""
         self.library.native_read_bounds(self._block)
