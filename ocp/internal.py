@@ -17,7 +17,13 @@ from ocp.checks.progress import told
 from ocp.checks.rich_text import html_of
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
-from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
+from ocp.codegen.compile import (
+    Unbuildable,
+    announce_interpreted,
+    built_library,
+    c_code,
+    compiled,
+)
 from ocp.expressions.foreign_functions import external
 from ocp.expressions.piecewise_constant import deciding, piecewise_constant
 from ocp.files.append import append_line
@@ -126,6 +132,7 @@ __all__ = [
     "Unbuildable",
     "Violation",
     "WithSlacks",
+    "announce_interpreted",
     "append_line",
     "applied",
     "bernstein",
