@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ocp import OCP, InitialGuess, Program, Status
-from ocp.internal import InSizes, RewrittenProgram
+from ocp.internal import InSizes, RewrittenProgram, interruptible
 from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.direct.native.native_batch import NativeBatch, NativeSolves
 from solvers.many.answers import Answers
@@ -76,6 +76,7 @@ class InC:
         answers.work[clean] = np.column_stack(work)[clean]
         answers.status[clean], answers.done[clean] = Status.SOLVED, True
 
+    @interruptible
     def _solves(self, asked: Questions) -> NativeSolves:
         """Return first iterates and data of all runs, in sizes."""
         tr = self.batch.transcription

@@ -16,7 +16,8 @@ class ManySolutions:
 
     A status is what the solver says; ``solution`` also compares a success with the referee, as
     ``solve`` does. What was not done, for lack of time or after Ctrl-C, has the status
-    ``TIME_LIMIT``, an infinite cost, and the start held.
+    ``TIME_LIMIT``, an infinite cost, and the start held. Answers that were found in C have no
+    ``history``.
 
     Attributes:
         asked: the data of every run.

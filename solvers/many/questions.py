@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ocp import OCP, InitialGuess, ProblemError
-from ocp.internal import RunData, check_instance, check_numeric, check_real
+from ocp.internal import ParameterValues, RunData, check_instance, check_numeric, check_real
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,18 +57,21 @@ class Questions:
         x = np.tile(ocp.start(), (count, 1)) if starts is None else starts
         first = (guesses,) if each is None else each
         found = cls(ocp, count, float(t0), x, values, tuple(map(ocp.first_guess, first)))
-        found._check_each()
+        _ = found._numbers  # looks at them
         return found
 
-    def _check_each(self) -> None:
-        """Look at the parameters of every run, whose shapes only the problem knows."""
+    @cached_property
+    def _numbers(self) -> list[ParameterValues]:
+        """The parameters of every run, whose shapes only the problem knows."""
         if not self.parameters:
-            return
+            return [self.ocp.parameter_values()] * self.count
+        found = []
         for i in range(self.count):
             try:
-                self.data(i)
+                found.append(self.ocp.parameter_values(self.values(i)))
             except ProblemError as error:
                 raise ProblemError(f"solve_many: run {i}: {error}") from None
+        return found
 
     def values(self, i: int) -> dict[str, Any] | None:
         """Return the parameters of run i."""
@@ -80,14 +83,7 @@ class Questions:
 
     def data(self, i: int) -> RunData:
         """Return the numbers of run i."""
-        values = (
-            self._declared if not self.parameters else self.ocp.parameter_values(self.values(i))
-        )
-        return RunData(self.starts[i], self.t0, values)
-
-    @cached_property
-    def _declared(self) -> Any:
-        return self.ocp.parameter_values()
+        return RunData(self.starts[i], self.t0, self._numbers[i])
 
 
 def _starts(ocp: OCP, x0: ArrayLike) -> np.ndarray:

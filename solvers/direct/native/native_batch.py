@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from ocp import OCP
-from ocp.internal import RunData, Transcription
+from ocp.internal import RunData, Transcription, interruptible
 from solvers.direct.first_trajectory import explodes
 from solvers.direct.native.flat_rows import FlatRows
 from solvers.direct.native.native_library import NativeLibrary, NativeOptions, NativeReport
@@ -137,6 +137,7 @@ class NativeBatch:
         for each in running:
             each.result()
 
+    @interruptible
     def clean(self, many: NativeSolves, t0: float) -> np.ndarray:
         """Return which answers need nothing else, bool (K,): as ``WarmRun`` accepts its own."""
         bound = NOT_STATIONARY * (1.0 + many.reported("multiplier"))
