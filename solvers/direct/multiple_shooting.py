@@ -243,8 +243,9 @@ class MultipleShootingProgram(FeedbackMethodProgram):
 
     @cached_property
     def native_batch(self) -> NativeBatch | None:
-        """Many solves in C, where ``_warm_run`` is and nothing jumps; None: one by one."""
-        if not isinstance(self.nlp, NativeNlp) or self._warm_run is None or switches(self.ocp):
+        """Many solves in C, where the start is given and nothing jumps; None: one by one."""
+        is_given = not self.ocp.has_free_start
+        if not (isinstance(self.nlp, NativeNlp) and is_given) or switches(self.ocp):
             return None
         return NativeBatch(self.nlp.run, self.solver.accuracy)
 

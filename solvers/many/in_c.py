@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp import OCP, InitialGuess, Program, Status
 from ocp.internal import InSizes, RewrittenProgram, interruptible
+from solvers.direct.first_trajectory import first_duration
 from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.direct.native.native_batch import NativeBatch, NativeSolves
 from solvers.many.answers import Answers
@@ -62,10 +63,15 @@ class InC:
         return many.done & ~clean
 
     def _put(self, answers: Answers, many: NativeSolves, clean: np.ndarray) -> None:
-        answers.x[clean] = many.x[clean] * self.x_size
+        tr = self.batch.transcription
+        nx, ocp = tr.ocp.model.nx, answers.asked.ocp
+        if ocp.has_free_time:
+            durations = tr.time_unit * many.x[clean, -1, nx]
+            answers.t[clean] = answers.asked.t0 + durations[:, None] * tr.fractions
+        answers.x[clean] = many.x[clean, :, :nx] * self.x_size
         answers.x[clean, 0] = answers.asked.starts[clean]  # without the rounding of the sizes
         answers.u[clean] = many.u[clean] * self.u_size
-        answers.costate[clean] = many.costate[clean] * (self.cost_size / self.x_size)
+        answers.costate[clean] = many.costate[clean, :, :nx] * (self.cost_size / self.x_size)
         answers.cost[clean] = many.reported("cost")[clean] * self.cost_size
         answers.residual[clean] = many.reported("dual")[clean]
         answers.iterations[clean] = many.reported("iterations")[clean]
@@ -82,18 +88,24 @@ class InC:
         tr = self.batch.transcription
         count, n, m = asked.count, tr.n, tr.ocp.model
         x = np.repeat(asked.starts[:, None], n + 1, axis=1)
-        u, costate = np.zeros((count, n, m.nu)), np.zeros((count, n + 1, m.nx))
+        u, costate = np.zeros((count, n, m.nu)), np.zeros((count, n + 1, tr.nz))
         has_states, is_warm = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        durations = np.full(count, asked.ocp.duration)
         for at, guess in self._by_guess(asked):
             read = _Read.of(asked.ocp, guess, tr.fractions)
+            durations[at] = first_duration(asked.ocp, guess)
             u[at] = 0.0 if read.u is None else read.u
             if read.x is not None:
                 x[at, 1:], has_states[at] = read.x[1:], True
                 is_warm[at] = read.costate is not None
-                costate[at] = 0.0 if read.costate is None else read.costate
+                costate[at, :, : m.nx] = 0.0 if read.costate is None else read.costate
         x /= self.x_size
+        durations = asked.ocp.time_box.clip(durations)
+        if tr.ocp.has_free_time:
+            times = np.repeat(durations[:, None, None] / tr.time_unit, n + 1, axis=1)
+            x = np.concatenate([x, times], axis=2)
         u = tr.ocp.control_bounds.clip(u / self.u_size)
-        costate *= self.x_size / self.cost_size
+        costate[..., : m.nx] *= self.x_size / self.cost_size
         return NativeSolves(x, u, costate, has_states, is_warm, self._data(asked))
 
     def _by_guess(self, asked: Questions) -> "list[tuple[slice | int, InitialGuess]]":

@@ -32,8 +32,8 @@ def solve_many(
 
     The answers are those of ``solver.build(ocp).run(x0=x0[i], ...)``, one after the other, but
     compared with the referee only when ``ManySolutions.solution`` is asked for one. With
-    ``MultipleShooting(backend="native")``, where start and final time are given and nothing has to
-    be rewritten but the units, all runs are solved in C, on several threads. Those whose answer
+    ``MultipleShooting(backend="native")``, where the start is given and nothing has to be rewritten
+    but the units, all runs are solved in C, on several threads. Those whose answer
     needs more (a failure, an inaccurate one, a control that stands still) are run one by one after
     that, and so are all runs of other solvers. The answers are the same for any number of threads.
 

@@ -1,5 +1,7 @@
 """Many runs at once: the answers of one after the other, whoever computes them."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from ocp import (
 from ocp.internal import scaled
 from solvers import Collocation, ManySolutions, MultipleShooting, solve_many
 from solvers.direct.multiple_shooting import MultipleShootingProgram
-from tests.native.problems import impossible, rationed
+from tests.native.problems import free_time, impossible, rationed
 from tests.native.test_warm_run import NATIVE, PULL, WIND, N, U, X, pushed
 
 K = 40
@@ -150,6 +152,28 @@ def test_a_scaled_problem_answers_in_the_units_of_the_user() -> None:
             np.testing.assert_allclose(found.u[i], run.u, atol=SAME * large)
             np.testing.assert_allclose(found.costate[i], run.costate, atol=SAME / large)
             assert found.cost[i] == pytest.approx(run.cost, rel=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["none", "duration", "solution"])
+def test_a_free_final_time(kind: str) -> None:
+    ocp, solver = free_time(), replace(NATIVE, intervals=20)
+    program = solver.build(ocp)
+    base = program.run().or_raise()
+    guess = {"none": None, "duration": Guess(duration=4.0, u=[0.5]), "solution": base}[kind]
+    starts = np.array([[0.0, 0.0], [0.2, 0.1], [-0.3, 0.2], [0.5, -0.2], [0.1, 0.9]])
+    found = solve_many(ocp, solver, x0=starts, t0=0.5, guesses=guess)
+    runs = [program.run(x0=x, t0=0.5, guess=guess) for x in starts]
+    assert found.in_c >= 3
+    assert np.ptp(found.t[:4, -1]) > 0.1
+    for i, run in enumerate(runs):
+        assert found.status[i] is run.status
+        assert found.cost[i] == pytest.approx(run.cost, rel=1e-8)
+        np.testing.assert_allclose(found.t[i], run.t, atol=1e-6)
+        np.testing.assert_allclose(found.x[i], run.x, atol=1e-6)
+        np.testing.assert_allclose(found.costate[i], run.costate, atol=1e-5)
+    late = solve_many(ocp, solver, x0=starts[:1], guesses=Guess(duration=50.0))
+    assert late.cost[0] == pytest.approx(found.cost[0], rel=1e-6)
+    assert found.solution(1).duration == pytest.approx(runs[1].duration, abs=1e-6)
 
 
 @pytest.mark.parametrize("solver", [MultipleShooting(N), Collocation(4)])

@@ -50,7 +50,7 @@ class NativeSolves:
     """K solves of one problem: first iterates, and then answers in their place.
 
     Attributes:
-        x: states, (K, N + 1, nx), with the start at node 0.
+        x: states, (K, N + 1, nx), with the start at node 0; a free final time is the last one.
         u: controls within their bounds, (K, N, nu).
         costate: (K, N + 1, nx).
         has_states: whether x is a first iterate, bool (K,); else the controls are rolled out.
@@ -92,7 +92,7 @@ class NativeSolves:
 
 @dataclass(frozen=True, eq=False)
 class NativeBatch:
-    """Many solves of one problem whose start and final time are given.
+    """Many solves of one problem whose start is given.
 
     Attributes:
         solver: the native solver of the problem.
@@ -149,7 +149,7 @@ class NativeBatch:
 
     def _may_start(self, many: NativeSolves, t0: float) -> np.ndarray:
         """Return which starts meet what they alone decide, see ``start_violation``."""
-        ocp, x0 = self._ocp, many.x[:, 0]
+        ocp, x0 = self._ocp, many.x[:, 0, : self._ocp.model.nx]
         excess = ocp.state_bounds.excess(x0).max(axis=1)
         if ocp.rows.path and ocp.decided_by_start.any():
             n_p = ocp.p.numel()
@@ -232,12 +232,13 @@ class _Work:
         self, library: NativeLibrary, pointers: _Pointers, first: int, end: int
     ) -> None:
         """Roll controls out where states are not known; hold the start where that explodes."""
-        many, box = self.many, self.batch.transcription.ocp.state_bounds
+        many, ocp = self.many, self.batch.transcription.ocp
         missing = first + np.flatnonzero(~many.has_states[first:end])
         if not missing.size:
             return
         library.roll_out(pointers, first, end)
-        x = many.x[missing]
+        x = many.x[missing, :, : ocp.model.nx]
         with np.errstate(invalid="ignore", over="ignore"):
-            wild = missing[explodes(x, box) | ~np.isfinite(x).all(axis=(1, 2))]
+            is_wild = explodes(x, ocp.state_bounds) | ~np.isfinite(x).all(axis=(1, 2))
+        wild = missing[is_wild]
         many.x[wild] = many.x[wild, :1]
