@@ -7,6 +7,7 @@ from ocp.checks.arguments import (
     check_instance,
     check_not_negative,
     check_numbers,
+    check_numeric,
     check_positive,
     check_real,
     check_whole,
@@ -16,7 +17,13 @@ from ocp.checks.progress import told
 from ocp.checks.rich_text import html_of
 from ocp.codegen.buffered_function import BufferedFunction
 from ocp.codegen.buffered_nlp import QUIET, BufferedNlp
-from ocp.codegen.compile import Unbuildable, built_library, c_code, compiled
+from ocp.codegen.compile import (
+    Unbuildable,
+    announce_interpreted,
+    built_library,
+    c_code,
+    compiled,
+)
 from ocp.expressions.foreign_functions import external
 from ocp.expressions.piecewise_constant import deciding, piecewise_constant
 from ocp.files.append import append_line
@@ -31,10 +38,12 @@ from ocp.linear.stationary import stationary
 from ocp.method.blocking_solver import BlockingSolver
 from ocp.method.feedback_program import FeedbackMethodProgram
 from ocp.method.in_normal_form import InNormalForm
+from ocp.method.in_sizes import InSizes
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
+from ocp.method.rewriting import RewrittenProgram
 from ocp.method.rewriting_of import rewriting_of
 from ocp.method.scaling_solver import ScalingSolver
 from ocp.method.with_slacks import WithSlacks
@@ -72,6 +81,7 @@ from ocp.problem.run_data import RunData
 from ocp.problem.scaled import ScaledOCP, scaled, sizes_of, with_row_sizes
 from ocp.problem.soft import excess
 from ocp.problem.start_feasibility import start_violation
+from ocp.problem.switches import switches
 from ocp.problem.walk import applied, walk
 from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
@@ -94,6 +104,7 @@ __all__ = [
     "FeedbackMethodProgram",
     "ImposedRows",
     "InNormalForm",
+    "InSizes",
     "Jump",
     "LQData",
     "LinearQuadratic",
@@ -106,6 +117,7 @@ __all__ = [
     "ParameterValues",
     "PiecewisePolynomial",
     "Portable",
+    "RewrittenProgram",
     "RunData",
     "RunResult",
     "ScaledOCP",
@@ -120,6 +132,7 @@ __all__ = [
     "Unbuildable",
     "Violation",
     "WithSlacks",
+    "announce_interpreted",
     "append_line",
     "applied",
     "bernstein",
@@ -132,6 +145,7 @@ __all__ = [
     "check_intervals",
     "check_not_negative",
     "check_numbers",
+    "check_numeric",
     "check_positive",
     "check_real",
     "check_whole",
@@ -172,6 +186,7 @@ __all__ = [
     "stage_hessian",
     "start_violation",
     "stationary",
+    "switches",
     "symbol_type",
     "time_unit",
     "told",

@@ -28,6 +28,8 @@ from solvers.kinematic.task import Task, descend, track
 from solvers.linear.batch import Batch
 from solvers.linear.linear_mpc import LinearMPC
 from solvers.linear.riccati import Riccati
+from solvers.many.many_solutions import ManySolutions
+from solvers.many.solve_many import solve_many
 from solvers.multistart import LocalOptimum, multistart, random_guesses
 from solvers.polish import polish
 from solvers.predictive.gpc import GPC, GPCLaw
@@ -64,6 +66,7 @@ __all__ = [
     "KinematicRun",
     "LinearMPC",
     "LocalOptimum",
+    "ManySolutions",
     "Mesh",
     "MeshRefinement",
     "MultipleShooting",
@@ -89,6 +92,7 @@ __all__ = [
     "refine_mesh",
     "repel",
     "second_order",
+    "solve_many",
     "switched",
     "track",
     "via_point_guesses",

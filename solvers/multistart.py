@@ -1,6 +1,6 @@
 """Solving from many starts: the distinct local optima they lead to."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Generic, TypeVar, overload
@@ -20,7 +20,9 @@ from ocp import (
     evaluate,
 )
 from ocp.internal import check_instance, check_not_negative, check_positive, check_whole, told
+from solvers.direct.multiple_shooting import MultipleShooting
 from solvers.indirect.indirect_shooting import IndirectShooting
+from solvers.many.solve_many import solve_many
 
 # Two answers whose true costs and states agree to this, relative, are the same optimum.
 _SAME_COST = 1e-4
@@ -119,25 +121,54 @@ def multistart(
     check_instance(guesses, (tuple, list), "multistart: guesses")
     if isinstance(solver, IndirectShooting):
         raise ProblemError("indirect shooting starts from costates: polish the optima instead")
-    started = perf_counter()
-    program = ocp.built_by(solver) if isinstance(ocp, Phases) else solver.build(ocp)
-    build_time = perf_counter() - started
     tried = (None, *guesses, *_guesses(ocp, starts - 1, seed, amplitude))
     report = told(progress, "multistart")
     found: list[LocalOptimum[Any]] = []
     try:
-        for k, guess in enumerate(tried):
+        report(0, len(tried), _best(found))
+        for k, solution in enumerate(_answers(ocp, solver, tried, report), start=1):
+            if solution.status.is_success:
+                verdict = evaluate(solution)
+                if verdict.violation <= violation:
+                    found = _merged(found, LocalOptimum(solution, verdict.cost, 1))
             report(k, len(tried), _best(found))
-            solution: Any = program.run(guess=guess).with_(build_time=build_time)
-            if not solution.status.is_success:
-                continue
-            verdict = evaluate(solution)
-            if verdict.violation <= violation:
-                found = _merged(found, LocalOptimum(solution, verdict.cost, 1))
-        report(len(tried), len(tried), _best(found))
     except KeyboardInterrupt:
         raise Interrupted("multistart", _in_order(found)) from None
     return _in_order(found)
+
+
+def _answers(
+    ocp: OCP | Phases, solver: Solver, tried: Sequence[Any], report: Progress
+) -> Iterator[Any]:
+    """Yield the answer of every start, in their order; the native backend solves them together."""
+    is_native = isinstance(solver, MultipleShooting) and solver.backend == "native"
+    if is_native and isinstance(ocp, OCP):
+        yield from _together(ocp, solver, tried, report)
+        return
+    started = perf_counter()
+    program = ocp.built_by(solver) if isinstance(ocp, Phases) else solver.build(ocp)
+    build_time = perf_counter() - started
+    for guess in tried:
+        yield program.run(guess=guess).with_(build_time=build_time)
+
+
+def _together(
+    ocp: OCP, solver: Solver, tried: Sequence[Any], report: Progress
+) -> Iterator[Solution]:
+    """Solve from all starts at once, then yield the answers; after Ctrl-C those that there are."""
+
+    def solving(done: int, total: int, said: str = "", /) -> None:
+        report(0, total, f"{done} solved")
+
+    interrupt: Interrupted | None = None
+    try:
+        answers = solve_many(ocp, solver, guesses=tuple(tried), progress=solving)
+    except Interrupted as interrupted:
+        answers, interrupt = interrupted.so_far, interrupted
+    for i in np.flatnonzero(answers.done).tolist():
+        yield answers.solution(i)
+    if interrupt is not None:
+        raise interrupt
 
 
 def _in_order(found: list[LocalOptimum[Any]]) -> tuple[LocalOptimum[Any], ...]:

@@ -13,7 +13,13 @@ from benchmarks.commands.peers import PEERS_COMMAND
 from benchmarks.commands.report import REPORT
 from benchmarks.commands.rooms import ROOMS
 from benchmarks.commands.run import RUN
-from benchmarks.commands.speed import ARM_SPEED, NATIVE_SPEED, PHASES_SPEED, SPEED
+from benchmarks.commands.speed import (
+    ARM_SPEED,
+    BATCH_SPEED,
+    NATIVE_SPEED,
+    PHASES_SPEED,
+    SPEED,
+)
 
 COMMANDS: tuple[Command, ...] = (
     LIST,
@@ -26,6 +32,7 @@ COMMANDS: tuple[Command, ...] = (
     ARM_SPEED,
     PHASES_SPEED,
     NATIVE_SPEED,
+    BATCH_SPEED,
     GREEDY,
     CLEAR,
     MPC,

@@ -1,4 +1,4 @@
-"""``speed``, ``arm-speed``, ``phases-speed``, ``native-speed``: what steps and solves cost."""
+"""``speed`` and ``arm-``, ``phases-``, ``native-``, ``batch-speed``: what steps and solves cost."""
 
 from argparse import ArgumentParser, Namespace
 
@@ -8,6 +8,7 @@ from benchmarks.commands.command import Command
 from benchmarks.commands.options import positive
 from benchmarks.speed.arm import INTERVALS, LINKS
 from benchmarks.speed.arm_tables import print_arm_speed
+from benchmarks.speed.batch import batch_table, batches
 from benchmarks.speed.linear import HORIZONS
 from benchmarks.speed.linear_tables import print_speed
 from benchmarks.speed.native import layers, layers_table, measured, native_table, races
@@ -66,6 +67,15 @@ def _native(options: Namespace, console: Console) -> int:
     return 0
 
 
+def _batch_options(parser: ArgumentParser) -> None:
+    parser.add_argument("--count", type=positive, default=1024, metavar="K", help="starts")
+
+
+def _batch(options: Namespace, console: Console) -> int:
+    console.print(batch_table(list(batches(options.count))))
+    return 0
+
+
 SPEED = Command("speed", "linear control: a step over N", _linear_options, _linear)
 ARM_SPEED = Command("arm-speed", "MPC on the arm: a step interpreted, compiled", _arm_options, _arm)
 PHASES_SPEED = Command(
@@ -73,4 +83,7 @@ PHASES_SPEED = Command(
 )
 NATIVE_SPEED = Command(
     "native-speed", "the native backend: one solve beside others", _native_options, _native
+)
+BATCH_SPEED = Command(
+    "batch-speed", "many starts at once, beside one by one", _batch_options, _batch
 )

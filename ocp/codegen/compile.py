@@ -40,7 +40,10 @@ _PROBES = 3
 
 
 class InterpretedWarning(UserWarning):
-    """A function could not be compiled: it runs interpreted, slower, with the same numbers."""
+    """A function could not be compiled: it runs interpreted, slower, with the same numbers.
+
+    The native backend of ``MultipleShooting`` is compiled as a whole: IPOPT takes its place.
+    """
 
 
 class Unbuildable(Exception):
@@ -138,7 +141,7 @@ def compiled(
         _compare(function, loaded, along)
         return loaded
     except Unbuildable as reason:
-        _announce(f"no compiled functions: {reason}. They run interpreted.")
+        announce_interpreted(str(reason))
         return function
 
 
@@ -301,5 +304,11 @@ def _processor() -> str:
 
 
 @cache
-def _announce(message: str) -> None:
-    warnings.warn(message, InterpretedWarning, stacklevel=3)
+def announce_interpreted(reason: str) -> None:
+    """Warn that there is no machine code, once per reason, whatever it was wanted for."""
+    warnings.warn(
+        f"no machine code: {reason}. Functions run interpreted, and IPOPT takes the place of the "
+        "native backend.",
+        InterpretedWarning,
+        stacklevel=3,
+    )

@@ -44,17 +44,19 @@ def first_states(
     if source == "held":
         return held
     x = rollout()
-    if not np.isfinite(x).all() or (source == "tame" and _explodes(x, box)):
+    if not np.isfinite(x).all() or (source == "tame" and explodes(x, box)):
         return held
     return x
 
 
-def _explodes(x: np.ndarray, box: Box) -> bool:
+def explodes(x: np.ndarray, box: Box) -> np.ndarray:
+    """Return whether roll-outs (..., N + 1, nx) grow beyond all that suggests their size, (...)."""
     bounds = np.abs(np.vstack([np.asarray(box.lower), np.asarray(box.upper)], dtype=float))
-    first = np.abs(x[: len(x) // 2 + 1]).max(axis=0)
+    first = np.abs(x[..., : x.shape[-2] // 2 + 1, :]).max(axis=-2)
     usual = np.maximum(first, np.where(np.isfinite(bounds), bounds, 0.0).max(axis=0))
-    usual = np.maximum(usual, _SMALL * usual.max())
-    return bool((np.abs(x).max(axis=0) > _EXPLODES * usual).any() and usual.max() > 0.0)
+    usual = np.maximum(usual, _SMALL * usual.max(axis=-1, keepdims=True))
+    is_beyond = np.abs(x).max(axis=-2) > _EXPLODES * usual
+    return is_beyond.any(axis=-1) & (usual.max(axis=-1) > 0.0)
 
 
 def first_duration(ocp: OCP, guess: InitialGuess | None) -> float:

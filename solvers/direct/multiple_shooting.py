@@ -22,8 +22,10 @@ from ocp.internal import (
     epigraph,
     least_violating,
     refuse_compiled,
+    switches,
 )
 from solvers.direct.first_trajectory import FirstStates, first_duration, other_starts
+from solvers.direct.native.native_batch import NativeBatch
 from solvers.direct.native.warm_run import WarmRun
 from solvers.direct.nlp_backends import NativeNlp, Nlp, NlpBackend
 from solvers.direct.nlp_outcome import NlpOutcome
@@ -32,6 +34,9 @@ from solvers.direct.nlp_run import NlpRun
 from solvers.direct.shooting_grid import ShootingGrid
 from solvers.direct.warm_start import WarmStart
 from solvers.direct.weak_method import weak_method
+
+# What is said of every answer of IPOPT where the native solver was asked, and is not there.
+_STANDS_IN = "by IPOPT, since the native solver could not be compiled"
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,9 @@ class MultipleShooting(BlockingSolver):
             brings its own number. Or a ``Grid`` of unequal ones.
         integrator: one-step method in each interval.
         backend: ``"ipopt"``; ``"fatrop"``, which exploits the stages; or ``"native"``, which does
-            so in C that is generated for the problem: it needs a C compiler, starts warm from a
-            guess with costates, and takes no ``blocks``.
+            so in C that is generated for the problem: it starts warm from a guess with costates,
+            and takes no ``blocks``. Without a C compiler IPOPT solves the same program: one
+            ``InterpretedWarning`` says so, and every message.
         tolerance: of the optimality conditions.
         max_iterations: limit of the backend.
         accuracy: largest accepted change of a state, relative to 1 + abs(x), when the step of an
@@ -216,8 +222,11 @@ class MultipleShootingProgram(FeedbackMethodProgram):
 
     @property
     def feeds_back(self) -> bool:
-        """Whether the backend is the native one, and start and final time are given."""
-        return self._warm_run is not None
+        """Whether the native backend is asked for, and start and final time are given.
+
+        Where it could not be compiled nothing gets prepared, and every step solves.
+        """
+        return self.solver.backend == "native" and self._is_given
 
     def _freeze(self, data: RunData, guess: InitialGuess | None) -> bool:
         return bool(self._warm_run and guess and self._warm_run.freeze(data, guess))
@@ -229,6 +238,16 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     def seconds_in_c(self) -> float | None:
         """What the native backend's last run took, by its own clock [s]; None of other backends."""
         return self.nlp.run.library.report().seconds if isinstance(self.nlp, NativeNlp) else None
+
+    # -- many solves at once -----------------------------------------------------------------
+
+    @cached_property
+    def native_batch(self) -> NativeBatch | None:
+        """Many solves in C, where the start is given and nothing jumps; None: one by one."""
+        is_given = not self.ocp.has_free_start
+        if not (isinstance(self.nlp, NativeNlp) and is_given) or switches(self.ocp):
+            return None
+        return NativeBatch(self.nlp.run, self.solver.accuracy)
 
     # -- the first iterate -------------------------------------------------------------------
 
@@ -259,10 +278,19 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     @cached_property
     def _warm_run(self) -> WarmRun | None:
         """Runs from an earlier plan, for the native backend; None: all are ``NlpRun``'s."""
-        is_given = not (self.ocp.has_free_start or self.ocp.has_free_time)
-        if not (isinstance(self.nlp, NativeNlp) and is_given):
+        if not (isinstance(self.nlp, NativeNlp) and self._is_given):
             return None
         return WarmRun(self.nlp.run, self.solver.accuracy)
+
+    @property
+    def _is_given(self) -> bool:
+        """Whether start and final time are given."""
+        return not (self.ocp.has_free_start or self.ocp.has_free_time)
+
+    @cached_property
+    def _solver_text(self) -> str:
+        """The solver, with the backend that runs."""
+        return repr(replace(self.solver, backend=self.nlp.backend.name))
 
     # -- the result ---------------------------------------------------------------------------
 
@@ -275,6 +303,8 @@ class MultipleShootingProgram(FeedbackMethodProgram):
 
     def _result(self, data: RunData, outcome: NlpOutcome, tr: Transcription) -> RunResult:
         """The last result, with the work of all runs."""
+        if self.solver.backend == "native" and not isinstance(self.nlp, NativeNlp):
+            outcome = outcome.told_by(_STANDS_IN)
         result = outcome.last
         z, u = tr.split(result.w)
         if tr.blocks is not None:  # without the rounding of its equations

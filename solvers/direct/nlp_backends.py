@@ -17,6 +17,8 @@ from ocp.internal import (
     QUIET,
     BufferedNlp,
     Transcription,
+    Unbuildable,
+    announce_interpreted,
     check_choice,
     check_flag,
     check_positive,
@@ -97,7 +99,8 @@ class NlpBackend:
         function = ca.nlpsol("nlp", self.name, transcription.program, {**common, **own})
         return CasadiNlp(self, function, transcription.is_control, self._subprocess(function))
 
-    def _native(self, transcription: TranscribedProblem) -> "NativeNlp":
+    def _native(self, transcription: TranscribedProblem) -> "Nlp":
+        """Set the native solver up; IPOPT where it cannot be compiled, with a warning."""
         if not isinstance(transcription, Transcription):
             raise UnsupportedProblem(
                 "the native backend takes the stages of multiple shooting alone"
@@ -113,7 +116,11 @@ class NlpBackend:
                 "take backend='ipopt'"
             )
         options = NativeLimits(self.tolerance, self.max_iterations, self.time_limit)
-        library = NativeLibrary.of(StageCode(transcription))
+        try:
+            library = NativeLibrary.of(StageCode(transcription))
+        except Unbuildable as reason:
+            announce_interpreted(str(reason))
+            return replace(self, name="ipopt").build(transcription)
         return NativeNlp(self, transcription, NativeSolve(library, options))
 
     def _subprocess(self, function: ca.Function) -> SubprocessFunction | None:

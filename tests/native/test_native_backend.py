@@ -15,6 +15,7 @@ from ocp import (
     Constraint,
     Guess,
     InputSource,
+    InterpretedWarning,
     Model,
     Plant,
     Radau,
@@ -24,9 +25,8 @@ from ocp import (
     evaluate,
     solve,
 )
-from ocp.codegen.compile import Compiler
-from ocp.internal import Transcription
-from solvers import MultipleShooting
+from ocp.internal import Transcription, Unbuildable
+from solvers import MultipleShooting, multistart, solve_many
 from solvers.direct.native import lane_code, native_library, native_solve
 from solvers.direct.native.native_library import NativeLibrary
 from solvers.direct.native.stage_code import StageCode
@@ -118,10 +118,47 @@ def test_an_iteration_limit_ends_it() -> None:
     assert solve(swing(), limited).status is Status.ITERATION_LIMIT
 
 
-def test_without_a_compiler_there_is_a_named_error() -> None:
-    code = StageCode(Transcription(swing(), 7, NATIVE.integrator))
-    with pytest.raises(UnsupportedProblem, match="swing: the native backend needs a C compiler"):
-        NativeLibrary.of(code, Compiler(command="no-such-compiler"))
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> str:
+    """A machine without one, of another name in each test, for a reason is told once."""
+    name = f"no-compiler-of-{request.node.name}"
+    monkeypatch.setenv("CC", name)
+    return name
+
+
+def test_without_a_compiler_ipopt_solves_it_with_one_warning(no_compiler: str) -> None:
+    with pytest.warns(InterpretedWarning, match=f"no compiler '{no_compiler}'") as caught:
+        found = [solve(ocp, NATIVE).or_raise() for ocp in (swing(), free_time())]
+    assert len([w for w in caught if w.category is InterpretedWarning]) == 1
+    for solution in found:
+        assert "by IPOPT, since the native solver could not be compiled" in solution.message
+        assert "backend='ipopt'" in solution.solver
+    np.testing.assert_allclose(found[0].u, solve(swing(), IPOPT).u, atol=1e-6)
+
+
+def test_what_fails_without_a_compiler_is_told_as_by_ipopt(no_compiler: str) -> None:
+    with pytest.warns(InterpretedWarning, match=no_compiler):
+        found = solve(impossible(), NATIVE)
+    assert found.status is Status.INFEASIBLE
+    assert solve(impossible(), IPOPT).message in found.message
+
+
+def test_many_runs_and_starts_do_without_a_compiler(no_compiler: str) -> None:
+    with pytest.warns(InterpretedWarning, match=no_compiler):
+        found = solve_many(rationed(), NATIVE, x0=[[0.0, 0.4], [0.1, 0.3]])
+    assert found.in_c == 0
+    assert found.solved.all()
+    assert len(multistart(rationed(), NATIVE, 2, 0, violation=1.0)) == 1
+
+
+def test_a_loop_without_a_compiler_solves_every_step(no_compiler: str) -> None:
+    with pytest.warns(InterpretedWarning, match=no_compiler) as caught:
+        mpc = MPC(ocp=rationed(), solver=NATIVE, dt=0.05, real_time=True)
+    first = mpc.step([0.0, 0.4], 0.0)
+    assert not mpc.prepare_next()
+    second = mpc.step([0.02, 0.42], 0.05)
+    assert len([w for w in caught if w.category is InterpretedWarning]) == 1
+    assert first.source is second.source is InputSource.OPTIMAL
 
 
 def test_the_optimum_costs_the_same_in_machine_code_of_another_horizon() -> None:
@@ -204,7 +241,7 @@ def test_a_start_that_is_data_is_refused_by_name() -> None:
 
 def test_a_mistake_of_the_compiler_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(lane_code._OPERATORS, ca.OP_SIN, "lanes_cos({0})")
-    with pytest.raises(UnsupportedProblem, match="gives other numbers than CasADi"):
+    with pytest.raises(Unbuildable, match="gives other numbers than CasADi"):
         NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
 
 
@@ -238,14 +275,14 @@ def test_a_mistake_in_a_half_step_is_noticed() -> None:
     assert native_library.first_difference(*given, wrong) == "the half step"
 
 
-def test_a_library_that_cannot_be_loaded_is_a_named_error(
+def test_a_library_that_cannot_be_loaded_is_a_named_warning(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     broken = tmp_path / "broken.so"
     broken.write_text("no machine code")
     monkeypatch.setattr(native_library, "built_library", lambda *_: broken)
-    with pytest.raises(UnsupportedProblem, match=r"swing: .* cannot be loaded"):
-        NativeLibrary.of(StageCode(Transcription(swing(), 7, NATIVE.integrator)))
+    with pytest.warns(InterpretedWarning, match=r"swing: .* cannot be loaded"):
+        assert "by IPOPT" in solve(swing(), NATIVE).or_raise().message
 
 
 @pytest.mark.slow

@@ -16,6 +16,8 @@ from solvers.direct.native.stage_code import StageCode
 from tests.native.problems import free_time, swing
 
 N = 10
+# Solves of a batch: no multiple of the lanes, the last from states that are given.
+MANY = 6
 STRICT = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
 
 # Reads what the caller of a solve writes, solves in memory of its own, and prints the cost.
@@ -39,6 +41,25 @@ int main(void) {
   const int ending = native_solve(block, &options, 1);
   native_report(block, report);
   printf("%d %.12e", ending, report[0]);
+  /* The same many times, in memory that ends with the last of them. */
+  const size_t states = (INTERVALS + 1) * NX, controls = INTERVALS * NU;
+  double *xs = calloc(MANY * states, sizeof(double)), *us = calloc(MANY * controls, sizeof(double));
+  double *lambdas = calloc(MANY * states, sizeof(double));
+  double *made = calloc(MANY * MADE, sizeof(double));
+  int own_data = 0, *has_states = calloc(MANY, sizeof(int)), *warm = calloc(MANY, sizeof(int));
+  volatile int stop = 0;
+  for (size_t i = 0; i < MANY; i++) {
+    memcpy(xs + i * states, x, sizeof x);
+    memcpy(us + i * controls, u, sizeof u);
+    has_states[i] = i % 2;
+  }
+  const Batch batch = {xs, us, lambdas, data, &own_data, has_states, warm, made, &stop};
+  const Options both[2] = {options, options};
+  native_roll_out(block, &batch, 0, MANY);
+  native_solve_many(block, &batch, both, 0, MANY);
+  for (int i = 0; i < MANY; i++) printf(" %.0f", made[i * MADE + REPORTED]);
+  printf(" %.12e", made[(MANY - 1) * MADE]);
+  free(xs), free(us), free(lambdas), free(made), free(has_states), free(warm);
   free(block);
   return 0;
 }
@@ -56,14 +77,17 @@ def test_it_solves_under_sanitizers_and_without_a_warning(make, tmp_path: Path) 
     arrays = _arrays(code)
     lines = [f"static const double {name}[] = {{{_numbers(a)}}};" for name, a in arrays.items()]
     source, program = tmp_path / "strict.c", tmp_path / "strict"
-    source.write_text("\n".join([code.code, f"#define INTERVALS {N}", *lines, _MAIN]))
+    source.write_text(
+        "\n".join([code.code, f"#define INTERVALS {N}", f"#define MANY {MANY}", *lines, _MAIN])
+    )
     words = [*Compiler().found, *STRICT, str(source), "-o", str(program), "-lm"]
     end, said = run_limited(words, 120.0, tmp_path)
     assert end == 0, f"{shlex.join(words)}\n{said}"
     end, said = run_limited([str(program)], 60.0, tmp_path)
     assert end == 0, said
-    ending, cost = said.split()
-    assert ending == "0"
+    ending, cost, *many, last = said.split()
+    assert [ending, *many] == ["0"] * (1 + MANY)
+    assert last == cost
     assert float(cost) == pytest.approx(solve(ocp, solver).or_raise().cost, rel=1e-9)
 
 

@@ -6,12 +6,13 @@ import pytest
 
 from benchmarks.cases import arm_scenario
 from models.textbook import double_integrator_energy, van_der_pol
-from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, Status, evaluate
+from ocp import OCP, Box, Constraint, Guess, Interrupted, Model, ProblemError, Status, evaluate
 from solvers import IndirectShooting, MultipleShooting, Schuetz, multistart, random_guesses
 from tests.solvers.problems import changed, ends, point
 from tests.tolerances import CERTIFIED
 
 STARTS = 6
+BACKENDS = ("ipopt", "native")
 
 
 @pytest.mark.many
@@ -28,6 +29,27 @@ def test_both_basins(name: str, basins: tuple[float, ...]) -> None:
     for optimum in found:
         assert optimum.solution.status is Status.SOLVED
         assert evaluate(optimum.solution).cost == pytest.approx(optimum.cost, rel=CERTIFIED)
+
+
+def test_the_native_backend_finds_the_same_optima() -> None:
+    ocp = arm_scenario("arm-003").ocp()
+    one, other = (multistart(ocp, MultipleShooting(20, backend=b), 4, 0) for b in BACKENDS)
+    assert [o.found for o in one] == [o.found for o in other]
+    np.testing.assert_allclose([o.cost for o in one], [o.cost for o in other], rtol=CERTIFIED)
+    assert other[0].solution.build_time > 0.0
+
+
+def test_the_native_backend_keeps_what_it_had_when_it_is_stopped() -> None:
+    """Nothing is lost of what was solved before Ctrl-C, though no answer was looked at yet."""
+
+    def stop(done: int, total: int, said: str = "", /) -> None:
+        if said == "3 solved":
+            raise KeyboardInterrupt
+
+    solver = MultipleShooting(20, backend="native")
+    with pytest.raises(Interrupted, match="multistart was stopped") as caught:
+        multistart(van_der_pol(), solver, 3, 0, progress=stop)
+    assert sum(optimum.found for optimum in caught.value.so_far) == 3
 
 
 def test_the_seed_decides() -> None:

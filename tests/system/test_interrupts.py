@@ -22,6 +22,7 @@ from solvers import (
     Schuetz,
     StagewiseNewton,
     multistart,
+    solve_many,
 )
 from solvers.direct.nlp_backends import CasadiNlp
 from solvers.direct.subprocess_function import SUBPROCESS_SUPPORTED
@@ -97,6 +98,11 @@ def running(solver: Solver, ocp: OCP) -> Callable[[], object]:
     return solver.build(ocp).run
 
 
+def many(ocp: OCP, solver: Solver) -> Callable[[], object]:
+    starts = np.random.default_rng(0).normal(size=(64, ocp.model.nx))
+    return lambda: solve_many(ocp, solver, x0=starts)
+
+
 def stepping(solver: Solver, ocp: OCP) -> Callable[[], object]:
     mpc = MPC(ocp=ocp, solver=solver, dt=0.1, compiled=False)
     return lambda: mpc.step(ocp.x0, 0.0)
@@ -126,6 +132,7 @@ JOBS: dict[str, Callable[[], Callable[[], object]]] = {
     "step": lambda: stepping(MultipleShooting(100), hard()),
     "loop": lambda: looping(MultipleShooting(20), cart()),
     "starts": lambda: lambda: multistart(hard(), MultipleShooting(40), starts=4, seed=0),
+    "many": lambda: many(hard(), MultipleShooting(40, backend="native")),
     "referee": lambda: judging(stiff()),
 }
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ocp import Compiler, UnsupportedProblem
+from ocp import Compiler
 from ocp.internal import Unbuildable, built_library
 from solvers.direct.native.library_check import first_difference
 from solvers.direct.native.native_arrays import NativeArrays
@@ -106,24 +106,16 @@ class NativeLibrary:
         """Compile and load it, or load it from the cache.
 
         Raises:
-            UnsupportedProblem: where there is no compiler, it fails, or what it has made cannot be
-                loaded or gives other numbers than CasADi.
+            Unbuildable: where there is no compiler, it fails, or what it has made cannot be loaded
+                or gives other numbers than CasADi.
+            UnsupportedProblem: for an operation that cannot be written as C.
         """
-        name, compiler = code.transcription.ocp.name, compiler or Compiler()
-        try:
-            path = built_library(code.code, compiler)
-        except Unbuildable as reason:
-            advice = "" if compiler.found else "install one (gcc or clang), or "
-            raise UnsupportedProblem(
-                f"{name}: the native backend needs a C compiler, and {reason}; "
-                f"{advice}take backend='ipopt'"
-            ) from reason
+        name, path = code.transcription.ocp.name, built_library(code.code, compiler or Compiler())
         try:
             library = ctypes.CDLL(str(path))
         except OSError as reason:
-            raise UnsupportedProblem(
-                f"{name}: the library of the native backend cannot be loaded: {reason}; "
-                "take backend='ipopt'"
+            raise Unbuildable(
+                f"{name}: the library of the native backend cannot be loaded: {reason}"
             ) from reason
         library.native_bytes.restype = ctypes.c_size_t
         library.native_evaluate.restype = ctypes.c_double
@@ -132,9 +124,9 @@ class NativeLibrary:
         library.native_shift.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]
         loaded = cls(code, library)
         if wrong := first_difference(code, loaded.arrays, loaded.evaluate, loaded.account):
-            raise UnsupportedProblem(
-                f"{name}: the compiled stage gives other numbers than CasADi ({wrong}): "
-                "the compiler is at fault; take backend='ipopt'"
+            raise Unbuildable(
+                f"{name}: the compiled stage gives other numbers than CasADi ({wrong}): the "
+                "compiler is at fault"
             )
         loaded._clear()
         return loaded
@@ -172,6 +164,20 @@ class NativeLibrary:
             ending = self.library.native_solve(self._block, ctypes.byref(options), begin)
             begin = 0
         return ending
+
+    def roll_out(self, batch: ctypes.Structure, first: int, end: int) -> None:
+        """Integrate the controls of some solves of a batch, see ``batch.h``."""
+        self.library.native_roll_out(self._block, ctypes.byref(batch), first, end)
+
+    def solve_many(
+        self,
+        batch: ctypes.Structure,
+        options: "ctypes.Array[NativeOptions]",
+        first: int,
+        end: int,
+    ) -> None:
+        """Solve some of a batch, cold or warm with the options of either, see ``batch.h``."""
+        self.library.native_solve_many(self._block, ctypes.byref(batch), options, first, end)
 
     def read_bounds(self) -> None:
         """Take over what is in ``low``, ``up``, ``x_given`` and ``u_given``."""

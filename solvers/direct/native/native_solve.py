@@ -166,6 +166,11 @@ class NativeSolve:
         """Those of a run from costates, by itself."""
         return self.limits.options(_Way.WARM, 0, 0.0)
 
+    @cached_property
+    def cold_options(self) -> NativeOptions:
+        """Those of a run without costates."""
+        return self.limits.options(_Way.COLD, 0, 0.0)
+
     def _is_used_up(self, stats: dict[str, Any], seconds: float) -> bool:
         """Whether neither time nor iterations are left for another way."""
         is_late = seconds >= self.limits.time_limit

@@ -32,6 +32,7 @@ _FILES = (
     "warm_start",
     "account",
     "entry",
+    "batch",
 )
 
 
