@@ -31,10 +31,12 @@ from ocp.linear.stationary import stationary
 from ocp.method.blocking_solver import BlockingSolver
 from ocp.method.feedback_program import FeedbackMethodProgram
 from ocp.method.in_normal_form import InNormalForm
+from ocp.method.in_sizes import InSizes
 from ocp.method.judged import judged
 from ocp.method.least_violating import least_violating
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.method.method_solver import ACCURACY, MethodSolver
+from ocp.method.rewriting import RewrittenProgram
 from ocp.method.rewriting_of import rewriting_of
 from ocp.method.scaling_solver import ScalingSolver
 from ocp.method.with_slacks import WithSlacks
@@ -94,6 +96,7 @@ __all__ = [
     "FeedbackMethodProgram",
     "ImposedRows",
     "InNormalForm",
+    "InSizes",
     "Jump",
     "LQData",
     "LinearQuadratic",
@@ -106,6 +109,7 @@ __all__ = [
     "ParameterValues",
     "PiecewisePolynomial",
     "Portable",
+    "RewrittenProgram",
     "RunData",
     "RunResult",
     "ScaledOCP",

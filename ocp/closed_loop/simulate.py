@@ -20,6 +20,7 @@ from ocp.closed_loop.decision import (
     Controller,
     ControlRefused,
     Decision,
+    PreparingController,
 )
 from ocp.closed_loop.delay import delay_steps
 from ocp.closed_loop.plant import Plant, RunningPlant
