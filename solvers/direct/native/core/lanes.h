@@ -8,7 +8,8 @@
 /* Nobody reads errno; without it a square root is one instruction. NaN and infinity stay. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-math-errno")
-/* Vectors are passed between functions of this file alone. */
+#endif
+#if defined(__GNUC__) /* Vectors are passed between functions of this file alone. */
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 

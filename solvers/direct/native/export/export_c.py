@@ -1,4 +1,4 @@
-"""``export_c``: a loop or a solver as a folder of C that needs a compiler and libm, nothing else."""
+"""``export_c``: a loop or a solver as a folder of C that needs a compiler and libm."""
 
 import re
 from hashlib import sha256
@@ -6,11 +6,11 @@ from pathlib import Path
 
 import casadi as ca
 
-from ocp import MPC, Program, ProblemError, Rollout, UnsupportedProblem
+from ocp import MPC, ProblemError, Program, Rollout, UnsupportedProblem
 from ocp.internal import write_file
 from solvers.direct.native.export.c_text import check_name
 from solvers.direct.native.export.exported_loop import ExportedLoop
-from solvers.direct.native.export.folder_texts import cmake, header, readme
+from solvers.direct.native.export.folder_texts import header, readme
 from solvers.direct.native.export.problem_tables import ProblemTables
 from solvers.direct.native.export.recording import Recording
 from solvers.direct.native.lane_code import lane_code
@@ -63,16 +63,15 @@ def export_c(
     text = "\n".join(body)
     magic = f"#define MAGIC UINT64_C(0x{sha256(text.encode()).hexdigest()[:16]})"
     begin = ["/* Made by the exporter of ocp-toolkit: change the problem, not this file. */"]
-    begin += ['#include "export.h"', "", "#define NO_CLOCK", "#define NOTED 1"]
-    begin += ['#include "export_lanes.h"', magic]
+    begin += ['#include "export.h"', _HEAD, '#include "export_lanes.h"', magic]
     files = {
         "export.h": header(tables) + _own("interface.h") + _HEADER_END,
         "export.c": "\n".join([*begin, text]),
         "export_lanes.h": read("lanes"),
         "export_recorded.h": Recording.of(loop, recorded).code,
         "example.c": _own("example.c"),
-        "CMakeLists.txt": cmake(),
-        "README.md": readme(tables),
+        "CMakeLists.txt": _own("CMakeLists.txt"),
+        "README.md": readme(tables, _own("README.md")),
     }
     target = Path(folder)
     try:
@@ -84,6 +83,13 @@ def export_c(
     return target
 
 
+# Products and sums are rounded one by one, as the recorded numbers were.
+_HEAD = """
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#endif
+#define NO_CLOCK
+#define NOTED 1"""
 _HEADER_END = """
 #ifdef __cplusplus
 }
@@ -98,8 +104,8 @@ def _functions(code: StageCode, tables: ProblemTables) -> str:
     text = lane_code(functions, code.transcription.ocp.name)
     if "casadi_int" in text:
         raise UnsupportedProblem(
-            f"export_c: {tables.loop.original.name} has a table or a root of an algebraic equation, "
-            "which are not exported yet: write them as expressions"
+            f"export_c: {tables.loop.original.name} has a table or a root of an algebraic "
+            "equation, which are not exported yet: write them as expressions"
         )
     return text
 

@@ -1,4 +1,4 @@
-"""``ExportedLoop``: a built solver, the way to its problem from the user's, and the loop around it."""
+"""``ExportedLoop``: a built solver, the way to it from the user's problem, and its loop."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class ExportedLoop:
         Raises:
             UnsupportedProblem: naming what cannot be exported.
         """
-        check_instance(source, MPC | Program, "export_c: what to export")
+        check_instance(source, (MPC, Program), "export_c: what to export")
         controller = source if isinstance(source, MPC) else None
         program = whole = _program_of(source) if isinstance(source, MPC) else source
         rewritings = []
@@ -57,10 +57,7 @@ class ExportedLoop:
                 break
             rewritings.append(program.rewriting)
             program = program.program
-        is_native = isinstance(program, MultipleShootingProgram) and isinstance(
-            program.nlp, NativeNlp
-        )
-        if not is_native:
+        if not isinstance(program, MultipleShootingProgram) or program.solver.backend != "native":
             raise UnsupportedProblem(
                 f"export_c: {type(program).__name__} has no C; take an MPC around "
                 "MultipleShooting(backend='native'), or what it builds. (A cost with kinks, such "

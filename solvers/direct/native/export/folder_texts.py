@@ -1,4 +1,4 @@
-"""What stands around the C: the head of the header, the README, CMake's file."""
+"""What is said of an exported loop: the head of its header, and its README."""
 
 from solvers.direct.native.export.problem_tables import ProblemTables
 from solvers.direct.native.stage_code import NOTE_BYTES, NOTED
@@ -11,9 +11,9 @@ _LOOP_BYTES = 256
 def header(tables: ProblemTables) -> str:
     """Return the head of the header: sizes, and what every number is."""
     lines = [
-        f"/* {tables.loop.original.name}: a control loop in C, made by the exporter of ocp-toolkit.",
+        "/* A control loop in C, made by the exporter of ocp-toolkit.",
         " *",
-        *(f" * {line}" if line else " *" for line in quantities(tables)),
+        *(f" * {line}" if line else " *" for line in _in_a_comment(tables)),
         " */",
         "#ifndef EXPORT_H",
         "#define EXPORT_H",
@@ -28,6 +28,12 @@ def header(tables: ProblemTables) -> str:
     lines += [f"#define {name} {value}" for name, value in _sizes(tables).items()]
     lines += _offsets(tables)
     return "\n".join([*lines, ""])
+
+
+def _in_a_comment(tables: ProblemTables) -> list[str]:
+    """Return problem and quantities; no name ends the comment."""
+    lines = [f"Problem: {tables.loop.original.name}", "", *quantities(tables)]
+    return [line.replace("*/", "* /").replace("\n", " ") for line in lines]
 
 
 def quantities(tables: ProblemTables) -> list[str]:
@@ -46,7 +52,9 @@ def quantities(tables: ProblemTables) -> list[str]:
     at = 0
     for name, value in loop.parameters.items():
         what = f"{len(value)} samples of {value.shape[1]}" if value.ndim == 2 else f"{value.size}"
-        lines.append(f"parameters[{at}] to [{at + value.size - 1}]  {name}: {what} (unit of the model)")
+        lines.append(
+            f"parameters[{at}] to [{at + value.size - 1}]  {name}: {what} (unit of the model)"
+        )
         at += value.size
     at = 0
     for name, count in tables.constants.items():
@@ -91,85 +99,18 @@ def _offsets(tables: ProblemTables) -> list[str]:
     return lines
 
 
-def cmake() -> str:
-    """Return CMake's file."""
-    return """cmake_minimum_required(VERSION 3.13)
-project(export C)
-set(CMAKE_C_STANDARD 11)
-set(CMAKE_C_EXTENSIONS OFF)
-if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE Release)
-endif()
-
-add_library(export_loop STATIC export.c)
-target_include_directories(export_loop PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-if(NOT MSVC)
-  target_compile_options(export_loop PRIVATE -Wall -Wextra)
-  target_link_libraries(export_loop PUBLIC m)
-endif()
-
-add_executable(export_example example.c)
-target_link_libraries(export_example export_loop)
-
-enable_testing()
-add_test(NAME recorded COMMAND export_example)
-"""
-
-
-def readme(tables: ProblemTables) -> str:
-    """Return the README."""
-    loop, counts = tables.loop, tables.counts
-    listed = "\n".join(f"- {line}" if line else "" for line in quantities(tables))
-    kilobytes = workspace_bytes(tables) / 1024.0
-    return f"""# export: {loop.original.name}
-
-A control loop in C11. It needs a C compiler and libm. It allocates nothing, prints nothing, and keeps no
-state but in memory that you give it.
-
-| file | what it is |
-|---|---|
-| `export.h` | the functions that you call |
-| `export.c`, `export_lanes.h` | the solver |
-| `example.c`, `export_recorded.h` | repeats steps that were recorded in Python, and compares |
-| `CMakeLists.txt` | builds a library, and the example as a test |
-
-Without CMake: `cc -std=c11 -O2 export.c example.c -lm -o example && ./example`
-
-## Use
-
-```c
-#include "export.h"
-
-static _Alignas(EXPORT_ALIGNMENT) unsigned char workspace[EXPORT_WORKSPACE_BYTES]; /* {kilobytes:.0f} kB */
-
-double x[EXPORT_NX], parameters[EXPORT_NP + 1], u[EXPORT_NU];
-export_init(workspace, sizeof workspace);     /* once */
-export_declared(x, parameters);               /* the numbers of the problem, to begin with */
-
-/* every {loop.dt:g} s: */
-export_status status = export_feedback(workspace, t, x, parameters, u);
-```
-
-Look at `status` at every step. `EXPORT_SOLVED`: u is the input of a new plan. `EXPORT_SHIFTED`: the solve has
-failed, u is what the plan before says for this time. `EXPORT_NO_PLAN` and everything from 16 on: **u was not
-written**, your own fallback has to act. `export_last_report` says how the solve has ended.
-
-`export_follow` gives the input of the plan that is kept where there is no measurement.
-
-## What goes in and comes out
-
-{listed}
-
-- The horizon is {loop.original.duration:g} s in {counts["INTERVALS"]} intervals, the sampling interval {loop.dt:g} s.
-- The delay from measurement to effect is {loop.delay:g} s; the inputs that are on their way are kept in the workspace.
-- Every array is of `double`. NaN and infinity in time, state or parameters are refused by a return code.
-
-## What it does not do
-
-- There is no clock in it: `max_iterations` of the solver bounds the time of a step.
-- After a failure it does not check that the plan before still meets the constraints, as Python does, and there is no
-  backup law.
-- Only the bounds of the inputs are imposed on what it returns; constraints hold as the plan meets them.
-- One workspace is for one thread at a time; several workspaces may be used at once.
-- On another processor, or with another compiler, the numbers differ by rounding.
-"""
+def readme(tables: ProblemTables, template: str) -> str:
+    """Return the README: the template with what is known of the loop."""
+    loop = tables.loop
+    said = {
+        "problem": loop.original.name,
+        "interval": f"{loop.dt:g}",
+        "horizon": f"{loop.original.duration:g}",
+        "intervals": str(tables.counts["INTERVALS"]),
+        "delay": f"{loop.delay:g}",
+        "kilobytes": f"{workspace_bytes(tables) / 1024.0:.0f}",
+        "quantities": "\n".join(f"- {line}" if line else "" for line in quantities(tables)),
+    }
+    for word, text in said.items():
+        template = template.replace(f"@{word}@", text)
+    return template

@@ -1,4 +1,4 @@
-"""What the C of a loop knows of its problem: sizes, and the way from the user's numbers as tables."""
+"""What the C of a loop knows of its problem: sizes, and tables for the user's numbers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -122,7 +122,7 @@ class ProblemTables:
         inputs = [(at + i, int(j), 1.0) for i, j in enumerate(rows)]
         return [
             *affine("data", *_affine(of_nodes, n_p)),
-            *affine("now", *_affine(now, n_p)),
+            *(affine("now", *_affine(now, n_p)) if self.counts["DELAY_STEPS"] else ()),
             terms("last_inputs", inputs if loop.controller else []),
         ]
 

@@ -64,8 +64,7 @@ class Recording:
                 head,
                 f"#define RECORDED_STEPS {len(rows)}",
                 f"static const double recorded_acting[] = {{{acting}}};",
-                "static const double recorded[RECORDED_STEPS]"
-                f"[{max(1, self.rows.shape[1])}] = {{",
+                f"static const double recorded[RECORDED_STEPS][{max(1, self.rows.shape[1])}] = {{",
                 ",\n".join(rows) + "};",
                 "",
             ]
@@ -102,6 +101,20 @@ def _solves(loop: ExportedLoop) -> Iterator[list[float]]:
                 )
             return
         t, x = float(plan.t[0]), plan.x0
-        yield [t, *x, *flat, *plan.u[0]]
+        yield [t, *x, *flat, *_first_input(loop, plan)]
+        if loop.original.has_free_start or loop.original.has_free_time:
+            return  # of one horizon: nothing follows it
         after = float(plan.t[1])
         plan = program.run(x0=plan.x[1], t0=after, guess=ShiftedPlan(plan, after))
+
+
+def _first_input(loop: ExportedLoop, plan: Solution) -> np.ndarray:
+    """Return the input of the first interval, as ``MPC`` reads it off a plan."""
+    form, earlier = loop.form, ShiftedPlan(plan, float(plan.t[0]))
+    nu, step = loop.original.model.nu, loop.dt / plan.duration
+    if form is None or not len(form.rates):
+        return plan.u[0]
+    u = earlier.sample("u", np.array([0.5 * step]), nu)[0].copy()
+    rated = loop.original.control_rates.index
+    u[rated] = earlier.sample("u", np.array([step]), nu)[0, rated]
+    return u
