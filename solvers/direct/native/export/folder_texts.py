@@ -1,11 +1,14 @@
 """What is said of an exported loop: the head of its header, and its README."""
 
 from solvers.direct.native.export.problem_tables import ProblemTables
+from solvers.direct.native.lane_code import most_alive
 from solvers.direct.native.stage_code import NOTE_BYTES, NOTED
 
 _ALIGNMENT = 64
 # Of the loop around the solver: its fixed numbers, and its arrays.
 _LOOP_BYTES = 256
+# Of a number in all lanes, and what the fixed part has on the stack.
+_LANE_BYTES, _FIXED_STACK = 32, 4096
 
 
 def header(tables: ProblemTables) -> str:
@@ -85,6 +88,12 @@ def workspace_bytes(tables: ProblemTables) -> int:
     return _whole_lines(_LOOP_BYTES + 8 * doubles) + _whole_lines(solver + _ALIGNMENT)
 
 
+def stack_bytes(tables: ProblemTables) -> int:
+    """Return about how much stack a call takes, where a compiler optimises."""
+    functions = [*tables.loop.solve.library.code.functions, *tables.interval]
+    return _LANE_BYTES * max(map(most_alive, functions)) + _FIXED_STACK
+
+
 def _whole_lines(count: int) -> int:
     return -(-count // _ALIGNMENT) * _ALIGNMENT
 
@@ -109,6 +118,7 @@ def readme(tables: ProblemTables, template: str) -> str:
         "intervals": str(tables.counts["INTERVALS"]),
         "delay": f"{loop.delay:g}",
         "kilobytes": f"{workspace_bytes(tables) / 1024.0:.0f}",
+        "stack": f"{stack_bytes(tables) / 1024.0:.0f}",
         "quantities": "\n".join(f"- {line}" if line else "" for line in quantities(tables)),
     }
     for word, text in said.items():
