@@ -336,13 +336,63 @@ def changing_slowly() -> OCP:
     )
 
 
+SOLVES = """
+#include <stdio.h>
+#include "loop.h"
+static _Alignas(LOOP_ALIGNMENT) unsigned char block[LOOP_WORKSPACE_BYTES];
+static double x0[LOOP_NX], p[LOOP_NP + 1], constants[LOOP_CONSTANTS + 1];
+static double t[LOOP_N + 1], x[(LOOP_N + 1) * LOOP_NX], u[LOOP_N * LOOP_NU];
+static void say(const double *numbers, int count) {
+  for (int i = 0; i < count; i++) printf("%.17g ", numbers[i]);
+  printf("\\n");
+}
+int main(void) {
+  loop_report report;
+  loop_declared(x0, p);
+  loop_init(block, sizeof block);
+  if (loop_solve(block, 0.0, x0, p) != LOOP_SOLVED) return 1;
+  loop_last_report(block, &report);
+  const double cost = report.cost;
+  loop_plan(block, t, x, u);
+  loop_constants(block, constants);
+  if (loop_solve_warm(block, 0.0, x0, p) != LOOP_SOLVED) return 2;
+  loop_last_report(block, &report);
+  const double costs[] = {cost, report.cost};
+  say(costs, 2);
+  say(t, LOOP_N + 1);
+  say(x, (LOOP_N + 1) * LOOP_NX);
+  say(u, LOOP_N * LOOP_NU);
+  say(constants, LOOP_CONSTANTS);
+  return 0;
+}
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [in_large_numbers, swing, changing_slowly, designed, free_time])
 def test_a_problem_that_is_rewritten_is_asked_in_its_own_terms(make, tmp_path: Path) -> None:
-    export_c(NATIVE.build(make()), tmp_path, name="loop")
-    flags = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-DNDEBUG")
-    # From another first iterate the same optimum, to the tolerance of the solver.
-    repeated(tmp_path, Compiler().found, flags, 1e-7)
+    program = replace(NATIVE, tolerance=1e-11).build(make())
+    export_c(program, tmp_path, name="loop")
+    flags = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-psabi")
+    words = [*Compiler().found, *flags, "-c", str(tmp_path / "loop.c")]
+    end, said = run([*words, "-o", str(tmp_path / "loop.o")], tmp_path)
+    assert end == 0, said
+    example = built(tmp_path, ["example.c", "loop.o"], Compiler().found, flags)
+    end, said = run([str(example), "1e-7"], tmp_path)
+    assert end == 0, said
+    (tmp_path / "main.c").write_text(SOLVES)
+    main = built(tmp_path, ["main.c", "loop.o"], Compiler().found, flags)
+    end, said = run([str(main)], tmp_path)
+    assert end == 0, said
+    costs, t, x, u, constants = (np.fromstring(line, sep=" ") for line in said.split("\n")[:5])
+    known = program.run().or_raise()
+    np.testing.assert_allclose(costs, known.cost, rtol=1e-7)
+    np.testing.assert_allclose(t, known.t, rtol=1e-7)
+    for found, own in ((x, known.x), (u, known.u[: len(known.t) - 1])):
+        size = np.abs(own).max(axis=0)
+        np.testing.assert_allclose(found.reshape(own.shape) / size, own / size, atol=1e-6)
+    values = [np.ravel(value) for value in known.unknowns.values()]
+    np.testing.assert_allclose(constants, np.concatenate([[], *values]), rtol=1e-7)
 
 
 @pytest.mark.slow
