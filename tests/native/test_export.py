@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models import cart_pole_upright
+from models import Disc, DistanceCost, PlanarArm, cart_pole_upright, redundancy_ocp
 from ocp import (
     MPC,
     OCP,
@@ -276,9 +276,6 @@ def test_what_has_no_c_is_refused_by_name(tmp_path: Path) -> None:
     kinked = pushed(running_cost=X[0] ** 2 + 0.1 * ca.fabs(U))
     with pytest.raises(UnsupportedProblem, match="cost with kinks"):
         export_c(NATIVE.build(kinked), tmp_path, name="p")
-    sending = MPC(ocp=ocp, solver=NATIVE, dt=0.1, applied=PlantInput("rate"), compiled=False)
-    with pytest.raises(UnsupportedProblem, match="sends rates"):
-        export_c(sending, tmp_path, name="p")
     hasty = MPC(ocp=ocp, solver=NATIVE, dt=0.1, real_time=True, compiled=False)
     with pytest.raises(UnsupportedProblem, match="real_time"):
         export_c(hasty, tmp_path, name="p")
@@ -491,3 +488,41 @@ def test_a_loop_may_begin_at_a_known_solution(tmp_path: Path) -> None:
     export_c(controller, tmp_path, name="loop", recorded=rollout)
     flags = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-psabi")
     repeated(tmp_path, Compiler().found, flags, 1e-12)
+
+
+def redundant() -> OCP:
+    """An arm of three links whose end follows a path past a disc."""
+    robot, start, t = PlanarArm((1.0, 1.0, 1.0)), (0.4, 0.9, 0.7), ca.SX.sym("t")
+    offset, first = ca.SX.sym("offset"), ca.DM(PlanarArm((1.0, 1.0, 1.0)).end_effector(start))
+    return redundancy_ocp(
+        robot,
+        lambda t: first + ca.vertcat(0.3 * ca.sin(2.0 * t) + offset, 0.0),
+        theta0=start,
+        horizon=0.5,
+        obstacles=(Disc((1.9, 0.4), 0.1),),
+        distance_cost=DistanceCost(10.0, 0.6, "sum"),
+        correction=5.0,
+        parameters=(Parameter("offset", offset, 0.0),),
+        t=t,
+        name="arm",
+    )
+
+
+@pytest.mark.slow
+def test_an_arm_is_sent_joint_velocities(tmp_path: Path) -> None:
+    ocp, rate = redundant(), ca.SX.sym("rate", 3)
+    sent = PlantInput("rate", Box(-2.0, 2.0))
+    controller = MPC(
+        ocp=ocp, solver=NATIVE, dt=0.05, delay=0.1, applied=sent, compiled=False, backup="hold"
+    )
+    angles = ca.SX.sym("theta", 3)
+    truth = Model(name="arm", x=angles, u=rate, f=1.01 * rate)
+    judge = OCP(name="arm", model=truth, x0=ocp.start(), horizon=1.0, running_cost=ca.sumsqr(rate))
+    plant = Plant(ocp=judge, measurement_noise=1e-3)
+    rollout = controller.run(plant, ocp.start(), 50 * 0.05)
+    assert np.abs(rollout.inputs).max() > 0.2
+    export_c(controller, tmp_path, name="loop", recorded=rollout)
+    flags = ("-std=c11", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", *SANITIZED)
+    said = repeated(tmp_path, Compiler().found, flags, 1e-12)
+    assert "50 steps" in said
+    assert "u[2]  rate of" in (tmp_path / "README.md").read_text()

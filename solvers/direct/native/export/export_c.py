@@ -50,7 +50,7 @@ def export_c(
     Raises:
         ProblemError: if the name is none in C, or the rollout is none to repeat.
         UnsupportedProblem: naming what cannot be exported: another solver, a cost with kinks,
-            tables and roots, rates that are sent, ``real_time``, signals of other lengths than
+            tables and roots, data and constraints at instants, ``real_time``, signals of other lengths than
             declared.
     """
     check_name(name)
@@ -100,7 +100,7 @@ _HEADER_END = """
 
 def _functions(code: StageCode, tables: ProblemTables) -> str:
     """Return the C of a stage, and of the prediction."""
-    functions: list[ca.Function] = [*code.functions, *tables.interval]
+    functions: list[ca.Function] = [*code.functions, *tables.of_instant]
     text = lane_code(functions, code.transcription.ocp.name)
     if "casadi_int" in text:
         raise UnsupportedProblem(

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ocp import MPC, OCP, Program, UnsupportedProblem
+from ocp import MPC, OCP, Box, Program, UnsupportedProblem
 from ocp.internal import (
     InNormalForm,
     InSizes,
@@ -78,11 +78,6 @@ class ExportedLoop:
         loop = self.controller
         if loop is None:
             return
-        if loop.applied.what != "control":
-            raise UnsupportedProblem(
-                f"{name}: a loop that sends rates is not exported: export one that sends its "
-                "controls, and make rates of them where they are sent"
-            )
         if loop.real_time:
             raise UnsupportedProblem(
                 f"{name}: real_time=True is not exported: the C solves at every step; leave it out"
@@ -118,6 +113,23 @@ class ExportedLoop:
     def delay(self) -> float:
         """Time from measurement to effect [s]."""
         return self.controller.delay if self.controller else 0.0
+
+    @property
+    def sends_rate(self) -> bool:
+        """Whether the plant receives the rate of the state, not the controls."""
+        return self.controller is not None and self.controller.applied.what == "rate"
+
+    @property
+    def input_size(self) -> int:
+        """How many numbers the plant receives."""
+        return np.size(self.input_box.lower)
+
+    @property
+    def input_box(self) -> Box:
+        """Bounds of what the plant receives."""
+        if self.controller is None:
+            return self.original.control_bounds
+        return self.controller.applied.box(self.original)
 
     @property
     def compensates(self) -> bool:

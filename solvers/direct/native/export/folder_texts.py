@@ -42,11 +42,11 @@ def _in_a_comment(tables: ProblemTables) -> list[str]:
 def quantities(tables: ProblemTables) -> list[str]:
     """Return what stands in x, u and the parameters, one line each, with units."""
     loop, m = tables.loop, tables.loop.original.model
-    lines = []
-    for label, names, units in (
-        ("x", m.x_names, m.x_units or ("",) * m.nx),
-        ("u", m.u_names, m.u_units or ("",) * m.nu),
-    ):
+    lines, x_units, u_units = [], m.x_units or ("",) * m.nx, m.u_units or ("",) * m.nu
+    sent = m.u_names, u_units
+    if loop.sends_rate:
+        sent = [f"rate of {n}" for n in m.x_names], [unit and f"{unit}/s" for unit in x_units]
+    for label, names, units in (("x", m.x_names, x_units), ("u", *sent)):
         each = zip(names, units, strict=True)
         lines += [
             f"{label}[{i}]  {name} {f'[{unit}]' if unit else '(unit of the model)'}"
@@ -70,7 +70,8 @@ def _sizes(tables: ProblemTables) -> dict[str, int | str]:
     counts = tables.counts
     return {
         "EXPORT_NX": counts["USER_NX"],
-        "EXPORT_NU": counts["USER_NU"],
+        "EXPORT_NU": counts["INPUTS"],
+        "EXPORT_CONTROLS": counts["USER_NU"],
         "EXPORT_NP": counts["USER_NP"],
         "EXPORT_N": counts["INTERVALS"],
         "EXPORT_CONSTANTS": sum(tables.constants.values()),
@@ -83,14 +84,14 @@ def workspace_bytes(tables: ProblemTables) -> int:
     """Return bytes that suffice: those of the solver with pointers of 8 bytes and 4 lanes."""
     counts, code = tables.counts, tables.loop.solve.library.code
     solver = tables.loop.solve.library.bytes - (NOTED - 1) * NOTE_BYTES
-    inputs = (1 + counts["DELAY_STEPS"]) * max(1, counts["USER_NU"]) + 1
+    inputs = (1 + counts["DELAY_STEPS"]) * max(1, counts["INPUTS"]) + 1
     doubles = inputs + code.nx + counts["USER_NX"] + counts["USER_NP"] + 1
     return _whole_lines(_LOOP_BYTES + 8 * doubles) + _whole_lines(solver + _ALIGNMENT)
 
 
 def stack_bytes(tables: ProblemTables) -> int:
     """Return about how much stack a call takes, where a compiler optimises."""
-    functions = [*tables.loop.solve.library.code.functions, *tables.interval]
+    functions = [*tables.loop.solve.library.code.functions, *tables.of_instant]
     return _LANE_BYTES * max(map(most_alive, functions)) + _FIXED_STACK
 
 

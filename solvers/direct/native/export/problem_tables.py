@@ -39,6 +39,8 @@ class ProblemTables:
             "INTERVALS": loop.program.transcription.n,
             "USER_NX": m.nx,
             "USER_NU": m.nu,
+            "INPUTS": loop.input_size,
+            "SENDS_RATE": int(loop.sends_rate),
             "USER_NP": len(self._declared),
             "USER_P": loop.original.p.numel(),
             "FORM_NX": loop.program.ocp.model.nx,
@@ -122,7 +124,7 @@ class ProblemTables:
         inputs = [(at + i, int(j), 1.0) for i, j in enumerate(rows)]
         return [
             *affine("data", *_affine(of_nodes, n_p)),
-            *(affine("now", *_affine(now, n_p)) if self.counts["DELAY_STEPS"] else ()),
+            *(affine("now", *_affine(now, n_p)) if self._looks_at_now else ()),
             terms("last_inputs", inputs if loop.controller else []),
         ]
 
@@ -151,7 +153,7 @@ class ProblemTables:
         of_x = np.ones(m.nx) if sizes is None else np.asarray(sizes.x)
         of_u = np.ones(m.nu) if sizes is None else np.asarray(sizes.u)
         from_ = m.nx + np.arange(m.nu) if loop.form is None else loop.form.controls
-        box, state_box = original.control_bounds, np.abs(_sides(loop.program.ocp.state_bounds))
+        box, state_box = loop.input_box, np.abs(_sides(loop.program.ocp.state_bounds))
         first, tr = self._first, loop.program.transcription
         costate = np.zeros((tr.n + 1, tr.nz)) if first.costate is None else first.costate
         lower, upper = (np.asarray(side, dtype=float) for side in (box.lower, box.upper))
@@ -176,14 +178,22 @@ class ProblemTables:
         ]
 
     @cached_property
-    def interval(self) -> tuple[ca.Function, ...]:
-        """The user's state a sampling interval later, where a delay is predicted."""
-        if not self.counts["DELAY_STEPS"]:
+    def of_instant(self) -> tuple[ca.Function, ...]:
+        """What is sent, where that is a rate; else the user's state a sampling interval later."""
+        if not self._looks_at_now:
             return ()
         ocp, m = self.loop.original, self.loop.original.model
         x, u, t, p = (ca.SX.sym("x", k) for k in (m.nx, m.nu, 1, ocp.p.numel()))
+        if self.loop.sends_rate:
+            (rate,) = ocp.functions.rate.call([x, u, t, p])
+            return (ca.Function("sent", [x, u, t, p], ca.cse([ca.densify(rate)])),)
         after, _ = Stage.of(ocp, RK4(), held=True).step.call([x, u, t, ca.SX(self.loop.dt), p, p])
         return (ca.Function("interval", [x, u, t, p], ca.cse([ca.densify(after)])),)
+
+    @property
+    def _looks_at_now(self) -> bool:
+        """Whether a function of the instant is called."""
+        return self.loop.sends_rate or self.counts["DELAY_STEPS"] > 0
 
     # -- what they are made of -------------------------------------------------------------------
 

@@ -51,7 +51,7 @@ class Recording:
         last = others[0] if others else len(sources)
         each = zip(made.decisions[:last], made.measured[:last], strict=True)
         rows = [[d.t, *x, *loop.flat(d.parameters), *d.input] for d, x in each]
-        return cls(made.inputs[0] if made.late else np.zeros(nu), np.array(rows))
+        return cls(made.inputs[0] if made.late else np.zeros(loop.input_size), np.array(rows))
 
     @property
     def code(self) -> str:
@@ -80,6 +80,7 @@ def _made(loop: ExportedLoop, controller: MPC) -> Rollout:
         parameters=controller.parameters,
         guess=controller.guess,
         delay=controller.delay,
+        applied=controller.applied,
         compensate=controller.compensate,
         tolerance=controller.tolerance,
         compiled=False,

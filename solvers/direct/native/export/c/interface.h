@@ -70,7 +70,7 @@ export_status export_feedback(void *workspace, double t, const double *x,
 export_status export_follow(void *workspace, double t, double *u);
 
 /* Read the plan that is kept: instants [s] (EXPORT_N + 1), states (EXPORT_N + 1, EXPORT_NX) node by
- * node, inputs of the intervals (EXPORT_N, EXPORT_NU). What is NULL is left out. */
+ * node, controls of the intervals (EXPORT_N, EXPORT_CONTROLS). What is NULL is left out. */
 export_status export_plan(const void *workspace, double *t, double *x, double *u);
 
 /* Read the unknown constants of the plan that is kept (EXPORT_CONSTANTS). */

@@ -21,8 +21,8 @@
 typedef struct {
   uint64_t magic; /* of this problem and version */
   int has_plan, has_input, is_pending, misses;
-  double input[AT_LEAST_1(USER_NU)];                             /* the last one */
-  double pending[AT_LEAST_1(DELAY_STEPS)][AT_LEAST_1(USER_NU)];  /* oldest first */
+  double input[AT_LEAST_1(INPUTS)];                             /* the last one */
+  double pending[AT_LEAST_1(DELAY_STEPS)][AT_LEAST_1(INPUTS)];  /* oldest first */
   double start[NX], user_start[USER_NX], parameters[AT_LEAST_1(USER_NP)];
   export_report report;
 } Loop;
@@ -86,15 +86,15 @@ export_status export_init(void *workspace, size_t bytes) {
 export_status export_reset(void *workspace, const double *acting) {
   const export_status wrong = workspace_error(workspace);
   if (wrong != EXPORT_SOLVED) return wrong;
-  if (acting && !all_finite(acting, USER_NU)) return EXPORT_BAD_INPUT;
+  if (acting && !all_finite(acting, INPUTS)) return EXPORT_BAD_INPUT;
   Loop *loop = workspace;
   memset(loop, 0, LOOP_BYTES);
   loop->magic = MAGIC;
   if (!acting || DELAY_STEPS == 0) return EXPORT_SOLVED;
   loop->has_input = 1;
-  memcpy(loop->input, acting, sizeof(double) * USER_NU);
+  memcpy(loop->input, acting, sizeof(double) * INPUTS);
   for (int k = 0; k < DELAY_STEPS; k++)
-    memcpy(loop->pending[k], acting, sizeof(double) * USER_NU);
+    memcpy(loop->pending[k], acting, sizeof(double) * INPUTS);
   loop->is_pending = DELAY_STEPS;
   return EXPORT_SOLVED;
 }
@@ -263,11 +263,12 @@ export_status export_solve_warm(void *workspace, double t, const double *x,
   return checked_solve(workspace, 1, t, x, parameters);
 }
 
-#if DELAY_STEPS > 0
-_Static_assert(USER_NX + USER_NU + 1 + USER_P <= MOST_IN, "an interval fits into the memory");
+#if SENDS_RATE || DELAY_STEPS > 0
+_Static_assert(USER_NX + USER_NU + 1 + USER_P <= MOST_IN, "the arguments fit into the memory");
 
-/* The user's state one sampling interval after t [s] under an input, parameters held. */
-static void predict_state(Loop *loop, double t, const double *u, double *x) {
+/* Put a state, a control and t [s] into the solver's memory, with the parameters of the first
+ * instant, for a function of (x, u, t, p). */
+static void put_instant(Loop *loop, const double *x, const double *u, double t) {
   Workspace *s = solver_of(loop);
   double p[AT_LEAST_1(USER_P)];
   affine(now_constants, USER_P, now_of_parameters, COUNT(now_of_parameters), loop->parameters, p);
@@ -277,13 +278,25 @@ static void predict_state(Loop *loop, double t, const double *u, double *x) {
     at = put(s->in, at, lane, &t, 1);
     put(s->in, at, lane, p, USER_P);
   }
-  interval(s->in, s->out);
-  get(s->out, 0, 0, x, USER_NX);
 }
 #endif
 
-/* The input that the plan has at t [s], within its bounds. */
-static void input_of_plan(const Workspace *s, double t, double *u) {
+#if DELAY_STEPS > 0
+/* The user's state one sampling interval after t [s] under an input, parameters held. */
+static void predict_state(Loop *loop, double t, const double *u, double *x) {
+#if SENDS_RATE
+  (void)loop, (void)t;
+  for (int i = 0; i < USER_NX; i++) x[i] += SAMPLING * u[i];
+#else
+  put_instant(loop, x, u, t);
+  interval(solver_of(loop)->in, solver_of(loop)->out);
+  get(solver_of(loop)->out, 0, 0, x, USER_NX);
+#endif
+}
+#endif
+
+/* The controls that the plan has at t [s]. */
+static void controls_of_plan(const Workspace *s, double t, double *u) {
   const double *nodes = s->plan_t, length = nodes[INTERVALS] - nodes[0];
   for (int i = 0; i < USER_NU; i++) {
     const int is_state = control_from[i] < FORM_NX;
@@ -297,7 +310,33 @@ static void input_of_plan(const Workspace *s, double t, double *u) {
     } else {
       u[i] = s->plan_u[(size_t)k * NU + control_from[i] - FORM_NX];
     }
-    u[i] = fmin(fmax(u[i] * control_sizes[i], input_lower[i]), input_upper[i]);
+    u[i] *= control_sizes[i];
+  }
+}
+
+/* The input that the plan has for a state at t [s], within its bounds. */
+static void input_of_plan(Loop *loop, double t, const double *x, double *u) {
+  double controls[AT_LEAST_1(USER_NU)];
+  controls_of_plan(solver_of(loop), t, controls);
+#if SENDS_RATE
+  put_instant(loop, x, controls, t);
+  sent(solver_of(loop)->in, solver_of(loop)->out);
+  get(solver_of(loop)->out, 0, 0, u, INPUTS);
+#else
+  (void)x;
+  memcpy(u, controls, sizeof(double) * INPUTS);
+#endif
+  for (int i = 0; i < INPUTS; i++) u[i] = fmin(fmax(u[i], input_lower[i]), input_upper[i]);
+}
+
+/* The state that the plan has at t [s], in the units of the user. */
+static void state_of_plan(const Workspace *s, double t, double *x) {
+  int k = 0;
+  while (k < INTERVALS - 1 && s->plan_t[k + 1] <= t) k++;
+  const double share = (t - s->plan_t[k]) / (s->plan_t[k + 1] - s->plan_t[k]);
+  for (int i = 0; i < USER_NX; i++) {
+    const double *below = s->plan_x + (size_t)k * NX + i;
+    x[i] = (below[0] + share * (below[NX] - below[0])) * user_scales[i];
   }
 }
 
@@ -316,7 +355,7 @@ static int leads_on(const Loop *loop, double t, const double *x) {
 
 /* Remember an input as sent. */
 static void send(Loop *loop, const double *u) {
-  memcpy(loop->input, u, sizeof(double) * USER_NU);
+  memcpy(loop->input, u, sizeof(double) * INPUTS);
   loop->has_input = 1;
 #if DELAY_STEPS > 0
   if (loop->is_pending == DELAY_STEPS) {
@@ -324,17 +363,20 @@ static void send(Loop *loop, const double *u) {
       memcpy(loop->pending[k - 1], loop->pending[k], sizeof loop->pending[k]);
     loop->is_pending--;
   }
-  memcpy(loop->pending[loop->is_pending++], u, sizeof(double) * USER_NU);
+  memcpy(loop->pending[loop->is_pending++], u, sizeof(double) * INPUTS);
 #endif
 }
 
-/* Write the input of the plan that is kept, where it reaches to t [s]. */
-static export_status follow_plan(Loop *loop, double t, double *u) {
+/* Write the input of the plan that is kept, where it reaches to t [s], for a state; NULL: the one
+ * that the plan has then. */
+static export_status follow_plan(Loop *loop, double t, const double *x, double *u) {
   const Workspace *s = solver_of(loop);
   const double rounding = SAME_STEP * SAMPLING;
   if (!loop->has_plan || t < s->plan_t[0] - rounding || t >= s->plan_t[INTERVALS] - rounding)
     return EXPORT_NO_PLAN;
-  input_of_plan(s, t, u);
+  if (!x) state_of_plan(s, t, loop->user_start);
+  input_of_plan(loop, t, loop->user_start, u);
+  if (!all_finite(u, INPUTS)) return EXPORT_NO_PLAN;
   send(loop, u);
   return EXPORT_SHIFTED;
 }
@@ -358,12 +400,12 @@ export_status export_feedback(void *workspace, double t, const double *x,
   if (!all_finite(start, USER_NX)) {
     loop->misses++;
     loop->report = (export_report){.status = EXPORT_DIVERGED};
-    return follow_plan(loop, acts, u);
+    return follow_plan(loop, acts, NULL, u);
   }
   const export_status status = solve_from(loop, leads_on(loop, acts, start), acts, start);
   loop->misses = status == EXPORT_SOLVED ? 0 : loop->misses + 1;
-  if (status != EXPORT_SOLVED) return follow_plan(loop, acts, u);
-  input_of_plan(solver_of(loop), acts, u);
+  if (status != EXPORT_SOLVED) return follow_plan(loop, acts, start, u);
+  input_of_plan(loop, acts, start, u);
   send(loop, u);
   return EXPORT_SOLVED;
 }
@@ -373,7 +415,7 @@ export_status export_follow(void *workspace, double t, double *u) {
   if (wrong != EXPORT_SOLVED) return wrong;
   if (!u) return EXPORT_NULL;
   if (!isfinite(t)) return EXPORT_BAD_TIME;
-  const export_status status = follow_plan(workspace, t + DELAY, u);
+  const export_status status = follow_plan(workspace, t + DELAY, NULL, u);
   return status == EXPORT_SHIFTED ? EXPORT_SOLVED : status;
 }
 
