@@ -16,6 +16,8 @@ from solvers.direct.native.export.recording import Recording
 from solvers.direct.native.lane_code import lane_code
 from solvers.direct.native.stage_code import FILES, StageCode, read
 
+# The loop, in the order in which the compiler reads it.
+_LOOP = ("memory.h", "solve_from.h", "loop.h", "read_out.h")
 _OWN = Path(__file__).with_name("c")
 
 
@@ -50,8 +52,8 @@ def export_c(
     Raises:
         ProblemError: if the name is none in C, or the rollout is none to repeat.
         UnsupportedProblem: naming what cannot be exported: another solver, a cost with kinks,
-            tables and roots, data and constraints at instants, ``real_time``, signals of other lengths than
-            declared.
+            tables and roots, data and constraints at instants, ``real_time``, signals of other
+            lengths than declared.
     """
     check_name(name)
     if recorded is not None and not isinstance(recorded, Rollout):
@@ -59,7 +61,7 @@ def export_c(
     loop = ExportedLoop.of(source)
     tables, code = ProblemTables(loop), loop.solve.library.code
     functions = _functions(code, tables)
-    body = [tables.code, code.sizes_code, functions, *map(read, FILES), _own("loop.h")]
+    body = [tables.code, code.sizes_code, functions, *map(read, FILES), *map(_own, _LOOP)]
     text = "\n".join(body)
     magic = f"#define MAGIC UINT64_C(0x{sha256(text.encode()).hexdigest()[:16]})"
     begin = ["/* Made by the exporter of ocp-toolkit: change the problem, not this file. */"]

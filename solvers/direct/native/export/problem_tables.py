@@ -82,7 +82,7 @@ class ProblemTables:
 
     @property
     def code(self) -> str:
-        """All of it, to stand before ``loop.h``."""
+        """All of it, to stand before the C of the loop."""
         lines = [f"#define {name} {value}" for name, value in self.counts.items()]
         lines += [f"#define {name} {value!r}" for name, value in self.reals.items()]
         lines += ["", "typedef struct {", "  int row, column;", "  double weight;", "} Term;", ""]
