@@ -102,6 +102,7 @@ int main(void) {
   say("NaN time", loop_solve_warm(block, NAN, x, p));
   const double acting = NAN;
   say("NaN input", loop_reset(block, &acting));
+  say("NaN sent", loop_sent(block, &acting));
   say("feedback", loop_feedback(block, 0.0, x, p, u));
   double before[LOOP_N + 1], plan[LOOP_N];
   loop_plan(block, before, NULL, plan);
@@ -141,6 +142,7 @@ def test_bad_input_is_refused_by_a_code(quick: Exported) -> None:
         ("infinite parameter", 22),
         ("NaN time", 20),
         ("NaN input", 23),
+        ("NaN sent", 23),
         ("feedback", 0),
         ("shifted", 5),
         ("input", 1),
@@ -171,11 +173,18 @@ int main(void) {
     loop_feedback(two, 0.1 * k, x, p, v); /* another loop in between */
     same += u[0] == row[1 + LOOP_NX + LOOP_NP] || k > 0;
   }
-  double twice[LOOP_NU];
+  double twice[LOOP_NU], once[LOOP_NU];
   loop_init(one, sizeof one);
   for (int k = 0; k < RECORDED_STEPS; k++)
     loop_feedback(one, recorded[k][0], recorded[k] + 1, recorded[k] + 1 + LOOP_NX, twice);
-  printf("%d", memcmp(u, twice, sizeof u) == 0 && same > 0);
+  const int repeats = memcmp(u, twice, sizeof u) == 0 && same > 0;
+  /* Two inputs are on their way: both workspaces are told the same ones. */
+  loop_reset(one, u);
+  loop_init(two, sizeof two);
+  for (int k = 0; k < 2; k++) loop_sent(two, u);
+  loop_feedback(one, 0.0, x, p, v);
+  loop_feedback(two, 0.0, x, p, once);
+  printf("%d", repeats && memcmp(v, once, sizeof v) == 0);
   return 0;
 }
 """

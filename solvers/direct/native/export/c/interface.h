@@ -69,6 +69,9 @@ export_status export_feedback(void *workspace, double t, const double *x,
  * as sent. */
 export_status export_follow(void *workspace, double t, double *u);
 
+/* Say what was sent where a step wrote no input, so that the next one predicts with that. */
+export_status export_sent(void *workspace, const double *u);
+
 /* Read the plan that is kept: instants [s] (EXPORT_N + 1), states (EXPORT_N + 1, EXPORT_NX) node by
  * node, controls of the intervals (EXPORT_N, EXPORT_CONTROLS). What is NULL is left out. */
 export_status export_plan(const void *workspace, double *t, double *x, double *u);

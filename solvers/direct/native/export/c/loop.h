@@ -155,3 +155,12 @@ export_status export_follow(void *workspace, double t, double *u) {
   const export_status status = follow_plan(workspace, t + DELAY, NULL, u);
   return status == EXPORT_SHIFTED ? EXPORT_SOLVED : status;
 }
+
+export_status export_sent(void *workspace, const double *u) {
+  const export_status wrong = workspace_error(workspace);
+  if (wrong != EXPORT_SOLVED) return wrong;
+  if (!u) return EXPORT_NULL;
+  if (!all_finite(u, INPUTS)) return EXPORT_BAD_INPUT;
+  send(workspace, u);
+  return EXPORT_SOLVED;
+}
