@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install bench test lint docs quick nightly constraints clean
+.PHONY: help install system bench test lint docs quick nightly constraints clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1\t/' | expand -t 14
@@ -34,6 +34,17 @@ $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python $(PIP) install --quiet -c constraints.txt -e '.[benchmarks,test,docs]'
 	touch $@
+
+# Other compilers and machines for what `export_c` writes. The tests that need them are skipped without.
+SYSTEM := clang gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf libc6-dev-arm64-cross libc6-dev-armhf-cross qemu-user
+system: ## install clang, cross compilers and an emulator for the tests (Debian, as root; else it says why not)
+	@if dpkg-query -W $(SYSTEM) > /dev/null 2>&1; then echo 'system: everything is there'; \
+	elif ! command -v apt-get > /dev/null || [ "$$(id -u)" != 0 ]; then \
+		echo 'system: neither Debian nor root, tests of the exported C for other machines are skipped'; \
+	else apt-get update -qq > /dev/null && DEBIAN_FRONTEND=noninteractive \
+		apt-get install -y -qq --no-install-recommends $(SYSTEM) > /dev/null || \
+		echo 'system: apt-get failed, tests of the exported C for other machines are skipped'; \
+	fi
 
 bench: $(STAMP) ## run the main job: all methods on the arm, a table and a picture
 	$(BIN)/python -m benchmarks bench

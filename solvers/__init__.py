@@ -12,6 +12,7 @@ from solvers.diagnose.diagnose import diagnose
 from solvers.diagnose.diagnosis import Diagnosis
 from solvers.diagnose.finding import Finding
 from solvers.direct.multiple_shooting import MultipleShooting
+from solvers.direct.native.export.export_c import export_c
 from solvers.direct.newton.stagewise_newton import StagewiseNewton
 from solvers.gradient.line_search import Armijo, FixedStep
 from solvers.gradient.schuetz import Schuetz
@@ -84,6 +85,7 @@ __all__ = [
     "descend",
     "diagnose",
     "enumerate_extremals",
+    "export_c",
     "gpc_loop",
     "multistart",
     "penalty_continuation",

@@ -63,6 +63,14 @@ def lane_code(functions: Iterable[ca.Function], problem: str) -> str:
     return "\n".join([foreign_code(code.foreign, problem), *code.written])
 
 
+def most_alive(function: ca.Function) -> int:
+    """Return how many numbers a function and what it calls have on the stack at once, at most."""
+    made = [len(function.instruction_output(k)) for k in range(function.n_instructions())]
+    given = [len(function.instruction_input(k)) for k in range(function.n_instructions())]
+    below = [given[k] + made[k] + most_alive(each) for k, each in _calls(function).items()]
+    return function.sz_w() + max(below, default=0)
+
+
 @dataclass(frozen=True, eq=False)
 class _LaneCode:
     """What is written so far.

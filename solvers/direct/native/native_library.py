@@ -11,12 +11,11 @@ from ocp import Compiler
 from ocp.internal import Unbuildable, built_library
 from solvers.direct.native.library_check import first_difference
 from solvers.direct.native.native_arrays import NativeArrays
-from solvers.direct.native.stage_code import StageCode
+from solvers.direct.native.stage_code import NOTED, StageCode
 
 _LINE = 64  # bytes that memory is aligned to
 _REPORT = 13  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
-_NOTED = 512  # iterations of which something is noted
 #: What is noted of an iteration.
 NOTE = ("cost", "primal", "dual", "product", "barrier", "shift", "length")
 
@@ -207,9 +206,13 @@ class NativeLibrary:
         return float(self.library.native_evaluate(self._block, order))
 
     @cached_property
+    def bytes(self) -> int:
+        """Length of its memory."""
+        return int(self.library.native_bytes(self.code.transcription.n))
+
+    @cached_property
     def _memory(self) -> np.ndarray:
-        n = self.code.transcription.n
-        return np.zeros(self.library.native_bytes(n) + _LINE, dtype=np.uint8)
+        return np.zeros(self.bytes + _LINE, dtype=np.uint8)
 
     @cached_property
     def _numbers(self) -> "ctypes.Array[ctypes.c_double]":
@@ -219,7 +222,7 @@ class NativeLibrary:
     @cached_property
     def _notes(self) -> tuple[ctypes.c_void_p, np.ndarray]:
         """Where notes are written, and as an array."""
-        notes = np.empty((_NOTED, len(NOTE)))
+        notes = np.empty((NOTED, len(NOTE)))
         return ctypes.c_void_p(notes.ctypes.data), notes
 
     @cached_property

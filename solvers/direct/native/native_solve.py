@@ -15,7 +15,7 @@ from solvers.direct.nlp_result import NlpResult
 from solvers.direct.warm_start import WarmStart
 
 # First barrier parameter, and that of a start with costates.
-_COLD, _WARM = 0.1, 1e-4
+COLD, WARM = 0.1, 1e-4
 # Those of a program frozen at an answer, from the multipliers of that, one after the other where no
 # step is found: further from it bounds may be active that were not.
 _FROZEN = (1e-6, 1e-3, 1e-1)
@@ -63,7 +63,7 @@ class NativeLimits:
         warm, monotone = way is _Way.WARM, way is _Way.MONOTONE
         return NativeOptions(
             tolerance=self.tolerance,
-            barrier=_WARM if warm else _COLD,
+            barrier=WARM if warm else COLD,
             max_iterations=float(self.max_iterations - iterations),
             time_limit=self.time_limit - seconds,
             pause=_PAUSE,

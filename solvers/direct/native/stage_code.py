@@ -20,8 +20,8 @@ from ocp.internal import (
 from solvers.direct.native.lane_code import lane_code
 
 _CORE = Path(__file__).with_name("core")
-# In the order in which the compiler reads them.
-_FILES = (
+#: Files of the fixed part after the generated one, in the order in which the compiler reads them.
+FILES = (
     "workspace",
     "evaluate",
     "frozen",
@@ -34,6 +34,9 @@ _FILES = (
     "entry",
     "batch",
 )
+
+#: Iterations of which ``workspace.h`` notes something, and bytes of a note.
+NOTED, NOTE_BYTES = 512, 56
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,10 +193,10 @@ class StageCode:
             UnsupportedProblem: for an operation that cannot be written so.
         """
         functions = lane_code(self.functions, self.transcription.ocp.name)
-        return "\n".join([read("lanes"), self._sizes, functions, *map(read, _FILES)])
+        return "\n".join([read("lanes"), self.sizes_code, functions, *map(read, FILES)])
 
     @property
-    def _sizes(self) -> str:
+    def sizes_code(self) -> str:
         """What ``workspace.h`` asks for."""
         nc, ni, ne = self.row_counts
         sizes = {"NX": self.nx, "NU": self.nu, "NW": self.nu + self.nx, "NB": len(self.bounded)}

@@ -8,11 +8,13 @@
 /* Nobody reads errno; without it a square root is one instruction. NaN and infinity stay. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("no-math-errno")
-/* Vectors are passed between functions of this file alone. */
+#endif
+#if defined(__GNUC__) /* Vectors are passed between functions of this file alone. */
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
-#if defined(__GNUC__)
+/* ONE_LANE: for processors without vectors, or with little memory. */
+#if defined(__GNUC__) && !defined(ONE_LANE)
 #define LANES 4
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t Truth __attribute__((vector_size(8 * LANES)));
@@ -28,7 +30,7 @@ static inline int every(Truth truth) {
 #else
 #define LANES 1
 typedef double V;
-#define LANE(a, l) (a)
+#define LANE(a, l) (*((void)(l), &(a)))
 #define ALL(c) (c)
 #define CHOOSE(truth, a, b) ((truth) ? (a) : (b))
 typedef int Truth;

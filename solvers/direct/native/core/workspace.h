@@ -23,7 +23,9 @@
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
+#ifndef NO_CLOCK /* without one there is no limit of time */
 #include <time.h>
+#endif
 
 #define AT_LEAST_1(n) ((n) > 0 ? (n) : 1)
 
