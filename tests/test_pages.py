@@ -15,7 +15,14 @@ KEPT = DOCS / "_static" / "pages"
 ALIKE = 0.9
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(p, marks=[pytest.mark.slow] if p.name.startswith("gallery/") else [])
+        for p in PAGES
+    ],
+    ids=lambda page: page.name,
+)
 def test_it_prints_and_draws_what_it_says(page: Page, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     for part in page.run():
@@ -58,6 +65,14 @@ def test_a_picture_is_what_is_called_so_above_it() -> None:
     assert printed == Printed("1\n", "")
     assert isinstance(shown, Shown)
     assert shown.file == "one.png"
+
+
+def test_a_picture_above_all_code_is_what_is_called_so_at_its_end() -> None:
+    code = "from matplotlib.figure import Figure\npicture = Figure()"
+    page = Page("top", f"![top](../_static/pages/top.png)\n\n```python\n{code}\n```\n")
+    _, shown = page.run()
+    assert isinstance(shown, Shown)
+    assert shown.file == "top.png"
 
 
 @pytest.mark.parametrize(

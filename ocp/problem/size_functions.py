@@ -21,6 +21,9 @@ ROUNDING = 1e-9
 _UNSTEADY, _TICK = 0.5, 1e-12
 # Beside a point, at so many others, a called function has its usual size, of which this is noise.
 _BESIDE, _NOISE = 4, 1e-13
+# Units do not make a number this small: it stands for a zero that one may divide by, as in the
+# slope of a distance at a place of symmetry.
+_NOTHING = 1e-100
 # A row has at least this part of its distance from the bounds as its size.
 _OF_DISTANCE = 0.1
 
@@ -209,5 +212,5 @@ def _offset(c: Constraint, value: np.ndarray, terms: np.ndarray) -> np.ndarray:
 
 
 def usable(values: np.ndarray) -> np.ndarray:
-    """Return which values are finite and not zero."""
-    return np.isfinite(values) & (values != 0.0)
+    """Return which values are sizes of something: finite, and not zero but for rounding."""
+    return np.isfinite(values) & (np.abs(values) > _NOTHING)

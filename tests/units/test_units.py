@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from benchmarks.cases import all_cases
+from models import free_body_ocp
+from models.shapes import Capsule, Cuboid
 from models.textbook import goddard, van_der_pol
 from ocp import OCP, Box, Constraint, Guess, Model, ProblemError, Solver, Status, evaluate, solve
 from ocp.internal import MethodProgram
@@ -243,6 +245,18 @@ def test_a_row_that_hardly_changes_is_measured_by_its_distance_from_the_bound() 
     )
     assert sizes_of(ocp).rows["clearance"][1] == pytest.approx(0.04, rel=1e-3)
     assert scaled(ocp) is None
+
+
+def test_a_slope_that_stands_for_zero_is_no_size() -> None:
+    # The distance of a body from a wall in front of it does not change to the side; its slope there
+    # is some 1e-200, and made the lengths aside 1e86 m, in which every tolerance is met.
+    wall = Cuboid([0.4, 2.0, 2.0]).at([0.0, 0.0, 1.0])
+    ends = {"start": [-2.0, 0.0, 1.0], "goal": [2.0, 0.0, 1.0]}
+    rod = Capsule([-0.3, 0.0, 0.0], [0.3, 0.0, 0.0], 0.1)
+    problem = free_body_ocp((rod,), (wall,), horizon=4.0, margin=0.05, **ends)
+    sizes = sizes_of(problem)
+    of_rows = np.concatenate(list(sizes.rows.values()))
+    assert np.concatenate([sizes.x, sizes.u, of_rows]).max() < 10.0
 
 
 def test_a_method_around_a_method_chooses_the_sizes() -> None:
