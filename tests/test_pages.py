@@ -60,6 +60,14 @@ def test_a_picture_is_what_is_called_so_above_it() -> None:
     assert shown.file == "one.png"
 
 
+def test_a_picture_above_all_code_is_what_is_called_so_at_its_end() -> None:
+    code = "from matplotlib.figure import Figure\npicture = Figure()"
+    page = Page("top", f"![top](../_static/pages/top.png)\n\n```python\n{code}\n```\n")
+    _, shown = page.run()
+    assert isinstance(shown, Shown)
+    assert shown.file == "top.png"
+
+
 @pytest.mark.parametrize(
     ("said", "printed", "same"),
     [

@@ -85,18 +85,28 @@ class Page:
     def run(self) -> Iterator[Printed | Shown]:
         """Run the code in the current folder, as one program; yield what it prints and draws.
 
+        A picture above all code is what ``picture`` is at the end of the page.
+
         Raises:
             TypeError: if ``picture`` is no figure where one is shown.
         """
         names: dict[str, Any] = {"__name__": self.name}
+        on_top = []
+        has_run = False
         for part in _PART.finditer(self.text):
+            if part["file"] and not has_run:
+                on_top.append(part["file"])
+                continue
             if part["file"]:
                 yield _shown(part["file"], names.get("picture"))
                 continue
+            has_run = True
             printed = StringIO()
             with redirect_stdout(printed):
                 exec(compile(part["code"], self.name, "exec"), names)
             yield Printed(printed.getvalue(), part["said"] or "")
+        for file in on_top:
+            yield _shown(file, names.get("picture"))
 
 
 def pages() -> tuple[Page, ...]:
