@@ -15,7 +15,14 @@ KEPT = DOCS / "_static" / "pages"
 ALIKE = 0.9
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(p, marks=[pytest.mark.slow] if p.name.startswith("gallery/") else [])
+        for p in PAGES
+    ],
+    ids=lambda page: page.name,
+)
 def test_it_prints_and_draws_what_it_says(page: Page, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     for part in page.run():
