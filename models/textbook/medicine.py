@@ -25,7 +25,7 @@ def tumour() -> OCP:
     p is the volume of the tumour, q what its vessels feed [mm^3]; (p, q)(0) = (P/2, P/4) with
     P = (5.83/0.00873)^{3/2}, t in days.
 
-    Optimum: 7571.67 at T = 1.2; the dose is full, then singular, then none. Problem:
+    Optimum: 7571.67 at T = 1.196; the dose is full until it is used up, then none. Problem:
     [Betts 2010, section 6.17], after [Ledzewicz & Schattler 2007].
     """
     p, q, dose = ca.SX.sym("p"), ca.SX.sym("q"), ca.SX.sym("dose")
