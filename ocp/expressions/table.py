@@ -19,10 +19,10 @@ from typing import Any, Literal, get_args
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
 
 from ocp.checks.arguments import check_choice, check_numeric
 from ocp.checks.errors import ProblemError
+from ocp.expressions.spline import spline
 
 Beyond = Literal["refuse", "extend", "clamp"]
 Between = Literal["cubic", "linear"]
@@ -144,7 +144,7 @@ class Table:
 
     def _at(self, x: list) -> Any:
         """Return the value at scalar expressions."""
-        if self.beyond == "refuse":
+        if self.beyond == "refuse" or self._goes_on:
             return self._spline(*x)
         ends = zip(x, *self.ends, strict=True)
         nearest = [ca.fmin(ca.fmax(each, low), high) for each, low, high in ends]
@@ -156,17 +156,21 @@ class Table:
             powers += [power * (each - end) for power in powers]
         return ca.dot(ca.vertcat(*powers), ca.vertcat(*self._spline.call(nearest)))
 
+    @property
+    def _goes_on(self) -> bool:
+        """Whether the outermost pieces of the spline, which go on, are the lines asked for."""
+        return self.beyond == "extend" and self.between == "linear"
+
     @cached_property
     def _spline(self) -> ca.Function:
         """The spline; to extend it with its derivatives along 0, 1, 0 and 1, 2, ... as well."""
         x = [ca.MX.sym(f"x{i}") for i in range(len(self.axes))]
-        parts = _coefficients(self.axes, np.asarray(self.values), _ORDER[self.between])
-        outputs = [ca.bspline(ca.vertcat(*x), *parts, 1, {})]
+        outputs = [spline(self.axes, np.asarray(self.values), _ORDER[self.between], x)]
         if self.beyond == "refuse":
             rows = zip(x, *_with_margin(self.axes), strict=True)
             outside = [ca.logic_or(each < low, each > high) for each, low, high in rows]
             outputs = [ca.if_else(ca.sum1(ca.vertcat(*outside)), np.nan, outputs[0])]
-        elif self.beyond == "extend":
+        elif self.beyond == "extend" and not self._goes_on:
             for each in x:
                 outputs += [ca.jacobian(output, each) for output in outputs]
         is_kinked, ends = self.between == "linear", self.beyond == "refuse"
@@ -184,27 +188,6 @@ def has_kinks(function: ca.Function) -> bool:
 def has_ends(function: ca.Function) -> bool:
     """Whether a function that an expression calls is a table without a value beyond its ends."""
     return _ENDING in function.name_out(0)
-
-
-def _coefficients(
-    axes: Sequence[np.ndarray], values: np.ndarray, order: int
-) -> tuple[ca.DM, list[list[float]], list[int]]:
-    """Return coefficients, knots and orders of the spline, as ``casadi.bspline`` takes them.
-
-    Its first and last pieces reach a margin beyond the ends: where an argument stands on an end,
-    its derivatives are those of the piece.
-    """
-    coefficients, knots = values, []
-    for axis, low, high in zip(axes, *_with_margin(axes), strict=True):
-        inside = make_interp_spline(axis, coefficients, order)
-        sites, t = axis.copy(), inside.t.copy()
-        sites[0], sites[-1] = low, high
-        t[: order + 1], t[-order - 1 :] = low, high
-        reaching = make_interp_spline(sites, inside(sites), order, t=t)
-        knots.append(t.tolist())
-        # This axis last: after all of them their order is the first again.
-        coefficients = np.moveaxis(reaching.c, 0, -1)
-    return ca.DM(coefficients.ravel(order="F")), knots, [order] * len(axes)
 
 
 def _with_margin(axes: Iterable[np.ndarray]) -> tuple[list[float], list[float]]:

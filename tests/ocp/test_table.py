@@ -113,6 +113,52 @@ def test_linear_between_its_knots() -> None:
     np.testing.assert_allclose(table([-1.0, 0.5, 1.0, 2.0, 4.0]), [-1.0, 0.5, 1.0, 0.5, -0.5])
 
 
+@pytest.mark.parametrize("between", ["linear", "cubic"])
+def test_at_a_knot_derivatives_are_those_to_the_right_of_it(between: Any) -> None:
+    """Of every order, as formulas: no memory is written that is another's, and no slope is 0."""
+    knots = np.linspace(-4.0, 4.0, 9)
+    x = ca.SX.sym("x")
+    derived = [Table(knots, np.sin(knots), "extend", between)(x)]
+    for _ in range(3):
+        derived.append(ca.jacobian(derived[-1], x))
+    function = ca.Function("f", [x], [ca.densify(each) for each in derived])
+    for knot in knots[1:-1]:
+        at, right = (np.array(function.call([v])).ravel() for v in (knot, knot + 1e-9))
+        np.testing.assert_allclose(at, right, atol=1e-7)
+    assert abs(float(function(1.0)[1])) > 0.05
+
+
+def test_linear_in_two_arguments_its_mixed_derivative_is_exact() -> None:
+    rows, columns = np.linspace(-1.0, 2.0, 5), np.array([0.0, 0.5, 2.0, 3.0])
+    table = Table((rows, columns), np.outer(rows**2, np.exp(columns)), between="linear")
+    for i, j in np.ndindex(4, 3):
+        values = np.asarray(table.values)[i : i + 2, j : j + 2]
+        size = (rows[i + 1] - rows[i]) * (columns[j + 1] - columns[j])
+        middle = [rows[i : i + 2].mean(), columns[j : j + 2].mean()]
+        mixed = (values[0, 0] - values[0, 1] - values[1, 0] + values[1, 1]) / size
+        curvature = derivatives(table)(middle)[2]
+        np.testing.assert_allclose(curvature, [[0.0, mixed], [mixed, 0.0]], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("backend", ["ipopt", "native"])
+@pytest.mark.parametrize("beyond", ["refuse", "clamp", "extend"])
+def test_a_start_on_a_knot_is_like_one_beside_it(beyond: Any, backend: Any) -> None:
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u")
+    knots = np.linspace(-4.0, 4.0, 9)
+    force = u + Table(knots, np.sin(knots), beyond, "linear")(x[0])
+    ocp = OCP(
+        name="pushed",
+        model=Model(name="pushed", x=x, u=u, f=ca.vertcat(x[1], force)),
+        x0=[1.0, 0.0],
+        horizon=2.0,
+        running_cost=ca.sumsqr(x) + u**2,
+        smoothness=0,
+    )
+    program = MultipleShooting(10, backend=backend).build(ocp)
+    on, beside = (program.run(x0=[at, 0.0]).or_raise() for at in (1.0, 1.0 + 1e-9))
+    assert on.cost == pytest.approx(beside.cost, rel=1e-7)
+
+
 def test_takes_columns_numbers_and_both_kinds_of_symbols() -> None:
     table = Table(KNOTS, cubic(KNOTS), "extend")
     kinds: tuple[Any, ...] = (ca.SX, ca.MX)
