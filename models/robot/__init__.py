@@ -1,6 +1,7 @@
 """Real robots: any tree of rigid bodies from a URDF, its kinematics, dynamics and motions."""
 
 from models.robot.among_obstacles import among_obstacles, robot_clearances
+from models.robot.animation import Motion, animate_motion
 from models.robot.description import (
     BoxShape,
     Collision,
@@ -45,6 +46,7 @@ __all__ = [
     "LinkShape",
     "MeshShape",
     "Mimic",
+    "Motion",
     "OrientationTask",
     "Payload",
     "Pose",
@@ -57,6 +59,7 @@ __all__ = [
     "TorqueForm",
     "TrackedMotion",
     "among_obstacles",
+    "animate_motion",
     "link_shapes",
     "panda",
     "read_urdf",

@@ -119,7 +119,7 @@ def robot_clearances(
     check_instance(q, ca.SX, f"{what}: q")
     if q.shape != (robot.n, 1):
         raise ProblemError(f"{what}: q has shape {q.shape}, ({robot.n}, 1) is needed")
-    _check_obstacles(obstacles, f"{what}: obstacles")
+    check_obstacles(obstacles, f"{what}: obstacles")
     least = check_not_negative(margin, f"{what}: margin")
     apart = check_not_negative(self_margin, f"{what}: self_margin")
     found = link_shapes(robot, shapes)
@@ -162,7 +162,12 @@ def _from_itself(
     ]
 
 
-def _check_obstacles(obstacles: Sequence[Shape], what: str) -> None:
+def check_obstacles(obstacles: Sequence[Shape], what: str) -> None:
+    """Refuse what is no shape in space.
+
+    Raises:
+        ProblemError: naming it.
+    """
     if isinstance(obstacles, tuple | list):
         for i, obstacle in enumerate(obstacles):
             if isinstance(obstacle, Obstacle):

@@ -1,0 +1,158 @@
+"""A motion of a robot to look at: one page that needs nothing but a browser."""
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import casadi as ca
+import numpy as np
+
+from models.robot.among_obstacles import check_obstacles
+from models.robot.link_shapes import link_shapes, placed_shapes
+from models.robot.robot import Robot
+from models.robot.tracked_motion import TrackedMotion
+from models.shapes.shapes import HalfSpace, Shape
+from models.shapes.surface import surface
+from ocp import ProblemError, Rollout, Solution, evaluate
+from ocp.internal import check_instance, check_positive, write_file
+
+Motion: TypeAlias = Solution | Rollout | TrackedMotion
+
+_ROBOT, _OBSTACLE, _PLANE = (0.93, 0.62, 0.23), (0.36, 0.52, 0.75), (0.82, 0.83, 0.85)
+# More frames than so many are a mistake; decimals of lengths [m] and of entries of rotations.
+_MOST, _DIGITS = 3000, 4
+
+
+def animate_motion(
+    robot: Robot,
+    motion: Motion,
+    path: str | Path,
+    *,
+    obstacles: Sequence[Shape] = (),
+    frame: str | None = None,
+    shapes: Mapping[str, Sequence[Shape]] | None = None,
+    t: ca.SX | None = None,
+    frames_per_second: float = 30.0,
+) -> Path:
+    """Write a motion as a page to look at in a browser; return its path.
+
+    The page shows the shapes of the links, the obstacles, and the way of a frame. It has a button
+    to play and a time line; it turns when it is dragged, the wheel brings it nearer. It is one
+    file, and takes nothing from the network.
+
+    Args:
+        robot: that moves.
+        motion: a ``Solution`` whose states begin with the joint coordinates, drawn as the referee
+            integrates it; a ``Rollout`` of such a problem, or a ``TrackedMotion``, drawn from
+            instant to instant.
+        path: of the file, ``.html``.
+        obstacles: ``models.shapes`` in the axes of the base; a half-space is drawn as a square.
+        frame: whose way is drawn; None: the last one of the robot.
+        shapes: of links, in place of those of the description; see ``link_shapes``.
+        t: the symbol of time in the poses of obstacles that move.
+        frames_per_second: pictures for each second of the motion.
+
+    Raises:
+        ProblemError: as ``link_shapes`` does; naming a frame that does not exist, an obstacle of
+            the plane or with other symbols than t, a path that is no .html, and a motion of
+            another robot or that is not finite.
+        OSError: if the file cannot be written.
+    """
+    check_instance(robot, Robot, "animation: robot")
+    what = f"{robot.name}: animation"
+    check_instance(path, (str, Path), f"{what}: path")
+    if Path(path).suffix != ".html":
+        raise ProblemError(f"{what}: {path} is no .html file")
+    check_obstacles(obstacles, f"{what}: obstacles")
+    times, q = _frames(robot, motion, check_positive(frames_per_second, f"{what}: frames"), what)
+    theta, time = ca.SX.sym("q", robot.n), ca.SX.sym("t") if t is None else t
+    tip = robot.frames[-1] if frame is None else frame
+    trail = _sampled(robot.position(theta, tip), theta, time, q, times, f"{what}: {tip}")
+    robot_shapes = placed_shapes(robot, theta, link_shapes(robot, shapes))
+    drawn = [(shape, _ROBOT, "robot") for shape in robot_shapes]
+    for i, shape in enumerate(obstacles):
+        colour = _PLANE if isinstance(shape, HalfSpace) else _OBSTACLE
+        drawn.append((shape, colour, f"obstacles[{i}]"))
+    scene = {
+        "times": np.round(times, _DIGITS).tolist(),
+        "bodies": [
+            _body(shape, colour, theta, time, q, times, f"{what}: {said}")
+            for shape, colour, said in drawn
+        ],
+        "trail": np.round(trail, _DIGITS).tolist(),
+    }
+    page = (files("models.robot") / "data" / "motion.html").read_text(encoding="utf-8")
+    text = page.replace("{{title}}", escape(robot.name)).replace("{{scene}}", json.dumps(scene))
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, text.encode())
+    return Path(path)
+
+
+def _frames(
+    robot: Robot, motion: Motion, per_second: float, what: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return equally spaced instants (K,) [s], and the joint coordinates at them (K, n)."""
+    check_instance(motion, (Solution, Rollout, TrackedMotion), f"{what}: motion")
+    if isinstance(motion, TrackedMotion):
+        known, states = motion.t, motion.q
+    elif isinstance(motion, Solution):
+        truth = evaluate(motion).truth
+        known, states = truth.t, truth.x
+    else:
+        known, states = motion.t, motion.x
+    if states.shape[1] < robot.n:
+        raise ProblemError(
+            f"{what}: the motion has {states.shape[1]} states, and {robot.name} {robot.n} joints: "
+            "is it one of another robot?"
+        )
+    if len(known) < 2 or not np.isfinite(states).all():
+        raise ProblemError(f"{what}: the motion has no finite states to draw")
+    duration = float(known[-1] - known[0])
+    count = max(2, round(duration * per_second) + 1)
+    if count > _MOST:
+        raise ProblemError(
+            f"{what}: {count} frames, at most {_MOST}: ask for fewer frames_per_second"
+        )
+    times = np.linspace(known[0], known[-1], count)
+    columns = [np.interp(times, known, column) for column in states[:, : robot.n].T]
+    return times, np.column_stack(columns)
+
+
+def _body(
+    shape: Shape,
+    colour: tuple[float, float, float],
+    theta: ca.SX,
+    time: ca.SX,
+    q: np.ndarray,
+    times: np.ndarray,
+    what: str,
+) -> dict[str, Any]:
+    """Return the triangles of a shape, and where it is: once, or in every frame."""
+    found, pose = surface(shape), ca.vertcat(ca.vec(shape.pose.R), shape.pose.p)
+    places = _sampled(pose, theta, time, q, times, what)
+    if not ca.symvar(pose):
+        places = places[:1]
+    return {
+        "colour": colour,
+        "points": np.round(found.points, _DIGITS).ravel().tolist(),
+        "normals": np.round(found.normals, 2).ravel().tolist(),
+        "places": np.round(places, _DIGITS).tolist(),
+    }
+
+
+def _sampled(
+    expression: ca.SX, theta: ca.SX, time: ca.SX, q: np.ndarray, times: np.ndarray, what: str
+) -> np.ndarray:
+    """Return an expression in q and t in every frame (K, m)."""
+    known = {s.element_hash() for s in ca.vertsplit(ca.vertcat(theta, time))}
+    foreign = [str(s) for s in ca.symvar(expression) if s.element_hash() not in known]
+    if foreign:
+        raise ProblemError(
+            f"{what} depends on {', '.join(foreign)}; give t=... if it is the time, and numbers "
+            "for all else"
+        )
+    function = ca.Function("frames", [theta, time], [ca.densify(expression)]).map(len(times))
+    return np.array(function(q.T, times[None, :])).T
