@@ -116,7 +116,12 @@ def test_rows_against_a_closed_form_and_their_slopes_against_differences() -> No
     """A ball beside the arm: its distance from the segment of a stretched chain."""
     robot, q = chain(), ca.SX.sym("q", 3)
     (c,) = robot_clearances(
-        robot, q, (Sphere(0.1).at([2.5, 0.4, 0.0]),), 0.02, shapes={"rod1": (), "rod2": ()}, pairs=()
+        robot,
+        q,
+        (Sphere(0.1).at([2.5, 0.4, 0.0]),),
+        0.02,
+        shapes={"rod1": (), "rod2": ()},
+        pairs=(),
     )
     assert c.name == "clearance of rod3[0] and obstacles[0] (Sphere)"
     assert float(np.asarray(c.lower).item()) == 0.02
@@ -138,7 +143,7 @@ def test_what_the_joints_do_not_move_has_no_row() -> None:
 
 def test_a_problem_of_torques_takes_obstacles() -> None:
     robot = panda()
-    goal = READY + [0.5, 0, 0, 0, 0, 0, 0]
+    goal = READY + 0.5 * np.eye(7)[0]
     plan = torque_ocp(robot, READY, goal, horizon=1.0, steps=20)
     fingers: dict = {"panda_leftfinger": (), "panda_rightfinger": ()}
     found = among_obstacles(
@@ -155,7 +160,8 @@ def test_a_start_in_collision_names_link_and_obstacle() -> None:
     robot = chain()
     obstacles = (Sphere(0.1).at([0.0, 5.0, 0.0]), Cuboid([0.2, 0.2, 0.2]).at([2.5, 0.0, 0.0]))
     with pytest.raises(
-        ProblemError, match=r"start: clearance of rod3\[0\] and obstacles\[1\] \(Cuboid\): .*overlap"
+        ProblemError,
+        match=r"start: clearance of rod3\[0\] and obstacles\[1\] \(Cuboid\): .*overlap",
     ):
         among_obstacles(motion(robot, np.zeros(3)), robot, obstacles)
 
@@ -170,7 +176,7 @@ def test_a_start_within_the_margin_is_said() -> None:
 
 def test_a_start_that_hits_itself_names_both_links() -> None:
     robot = chain()
-    with pytest.raises(ProblemError, match="start: clearance of rod1 and rod3: .*overlap"):
+    with pytest.raises(ProblemError, match=r"start: clearance of rod1 and rod3: .*overlap"):
         among_obstacles(motion(robot, np.array([0.0, 2.2, 2.2])), robot, ())
 
 
