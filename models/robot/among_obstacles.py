@@ -36,7 +36,8 @@ def among_obstacles(
 ) -> OCP:
     """Return a problem in which a robot keeps away from obstacles and from itself.
 
-    It is the given problem with the constraints of ``robot_clearances``, and its start is checked.
+    It is the given problem with the constraints of ``robot_clearances``, and its start is checked,
+    unless it is free.
 
     Args:
         ocp: a problem whose states begin with the joint coordinates, such as ``torque_ocp``.
@@ -72,7 +73,8 @@ def among_obstacles(
     )
     found = replace(ocp, constraints=(*ocp.constraints, *added))
     start = ocp.start()
-    _refuse_contact(found, added, "start", start, 0.0)
+    if not ocp.has_free_start:  # else it is a guess
+        _refuse_contact(found, added, "start", start, 0.0)
     if goal is not None:
         end = check_numbers(goal, robot.n, f"{ocp.name}: goal", repeat=False)
         if q is not None:
@@ -184,11 +186,10 @@ def _refuse_contact(
     """Refuse a state at which a constraint does not hold, at the start or the end of time."""
     if not constraints:
         return
-    duration = float(ocp.horizon) if isinstance(ocp.horizon, int | float) else 0.0
     least = [ca.mmin(constraint.expression) for constraint in constraints]
     function = ca.Function("clearance", [ocp.model.x, ocp.model.t, ocp.p], [ca.vertcat(*least)])
     parameters = ocp.parameter_values().at(np.array([share]))[0]
-    values = np.array(function(x, share * duration, parameters)).ravel()
+    values = np.array(function(x, share * ocp.duration, parameters)).ravel()
     needed = np.array([np.max(np.asarray(c.lower)) for c in constraints])
     worst = int((values - needed).argmin())
     apart, margin = float(values[worst]), float(needed[worst])

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -67,21 +68,18 @@ def animate_motion(
     if Path(path).suffix != ".html":
         raise ProblemError(f"{what}: {path} is no .html file")
     check_obstacles(obstacles, f"{what}: obstacles")
-    times, q = _frames(robot, motion, check_positive(frames_per_second, f"{what}: frames"), what)
-    theta, time = ca.SX.sym("q", robot.n), ca.SX.sym("t") if t is None else t
+    per_second = check_positive(frames_per_second, f"{what}: frames_per_second")
+    frames = _frames(robot, motion, per_second, ca.SX.sym("t") if t is None else t, what)
     tip = robot.frames[-1] if frame is None else frame
-    trail = _sampled(robot.position(theta, tip), theta, time, q, times, f"{what}: {tip}")
-    robot_shapes = placed_shapes(robot, theta, link_shapes(robot, shapes))
-    drawn = [(shape, _ROBOT, "robot") for shape in robot_shapes]
+    trail = frames.sampled(robot.position(frames.theta, tip), f"{what}: {tip}")
+    links = placed_shapes(robot, frames.theta, link_shapes(robot, shapes))
+    bodies = [_body(frames, shape, _ROBOT, what) for shape in links]
     for i, shape in enumerate(obstacles):
         colour = _PLANE if isinstance(shape, HalfSpace) else _OBSTACLE
-        drawn.append((shape, colour, f"obstacles[{i}]"))
+        bodies.append(_body(frames, shape, colour, f"{what}: obstacles[{i}]"))
     scene = {
-        "times": np.round(times, _DIGITS).tolist(),
-        "bodies": [
-            _body(shape, colour, theta, time, q, times, f"{what}: {said}")
-            for shape, colour, said in drawn
-        ],
+        "times": np.round(frames.times, _DIGITS).tolist(),
+        "bodies": bodies,
         "trail": np.round(trail, _DIGITS).tolist(),
     }
     page = (files("models.robot") / "data" / "motion.html").read_text(encoding="utf-8")
@@ -91,10 +89,34 @@ def animate_motion(
     return Path(path)
 
 
-def _frames(
-    robot: Robot, motion: Motion, per_second: float, what: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return equally spaced instants (K,) [s], and the joint coordinates at them (K, n)."""
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    """What the pictures show: instants (K,) [s], and the joint coordinates at them (K, n)."""
+
+    times: np.ndarray
+    q: np.ndarray
+    theta: ca.SX
+    t: ca.SX
+
+    def sampled(self, expression: ca.SX, what: str) -> np.ndarray:
+        """Return an expression in the symbols of q and t in every frame (K, m).
+
+        Raises:
+            ProblemError: if it has another symbol, naming it and ``what``.
+        """
+        known = {s.element_hash() for s in ca.vertsplit(ca.vertcat(self.theta, self.t))}
+        foreign = [str(s) for s in ca.symvar(expression) if s.element_hash() not in known]
+        if foreign:
+            raise ProblemError(
+                f"{what} depends on {', '.join(foreign)}; give t=... if it is the time, and "
+                "numbers for all else"
+            )
+        function = ca.Function("frames", [self.theta, self.t], [ca.densify(expression)])
+        return np.array(function.map(len(self.times))(self.q.T, self.times[None, :])).T
+
+
+def _frames(robot: Robot, motion: Motion, per_second: float, t: ca.SX, what: str) -> _Frames:
+    """Return equally spaced instants, and where the joints are then."""
     check_instance(motion, (Solution, Rollout, TrackedMotion), f"{what}: motion")
     if isinstance(motion, TrackedMotion):
         known, states = motion.t, motion.q
@@ -110,29 +132,22 @@ def _frames(
         )
     if len(known) < 2 or not np.isfinite(states).all():
         raise ProblemError(f"{what}: the motion has no finite states to draw")
-    duration = float(known[-1] - known[0])
-    count = max(2, round(duration * per_second) + 1)
+    count = max(2, round(float(known[-1] - known[0]) * per_second) + 1)
     if count > _MOST:
         raise ProblemError(
             f"{what}: {count} frames, at most {_MOST}: ask for fewer frames_per_second"
         )
     times = np.linspace(known[0], known[-1], count)
     columns = [np.interp(times, known, column) for column in states[:, : robot.n].T]
-    return times, np.column_stack(columns)
+    return _Frames(times, np.column_stack(columns), ca.SX.sym("q", robot.n), t)
 
 
 def _body(
-    shape: Shape,
-    colour: tuple[float, float, float],
-    theta: ca.SX,
-    time: ca.SX,
-    q: np.ndarray,
-    times: np.ndarray,
-    what: str,
+    frames: _Frames, shape: Shape, colour: tuple[float, float, float], what: str
 ) -> dict[str, Any]:
     """Return the triangles of a shape, and where it is: once, or in every frame."""
     found, pose = surface(shape), ca.vertcat(ca.vec(shape.pose.R), shape.pose.p)
-    places = _sampled(pose, theta, time, q, times, what)
+    places = frames.sampled(pose, what)
     if not ca.symvar(pose):
         places = places[:1]
     return {
@@ -141,18 +156,3 @@ def _body(
         "normals": np.round(found.normals, 2).ravel().tolist(),
         "places": np.round(places, _DIGITS).tolist(),
     }
-
-
-def _sampled(
-    expression: ca.SX, theta: ca.SX, time: ca.SX, q: np.ndarray, times: np.ndarray, what: str
-) -> np.ndarray:
-    """Return an expression in q and t in every frame (K, m)."""
-    known = {s.element_hash() for s in ca.vertsplit(ca.vertcat(theta, time))}
-    foreign = [str(s) for s in ca.symvar(expression) if s.element_hash() not in known]
-    if foreign:
-        raise ProblemError(
-            f"{what} depends on {', '.join(foreign)}; give t=... if it is the time, and numbers "
-            "for all else"
-        )
-    function = ca.Function("frames", [theta, time], [ca.densify(expression)]).map(len(times))
-    return np.array(function(q.T, times[None, :])).T

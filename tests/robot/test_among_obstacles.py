@@ -1,5 +1,7 @@
 """Robots among obstacles: what their links are, what is kept apart, what is refused."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -184,6 +186,25 @@ def test_a_goal_in_collision_is_named() -> None:
     robot = chain()
     with pytest.raises(ProblemError, match="goal: clearance of rod1 and rod3"):
         among_obstacles(motion(robot, np.zeros(3)), robot, (), goal=[0.0, 2.2, 2.2])
+
+
+def test_a_free_start_is_a_guess() -> None:
+    robot = chain()
+    free = replace(motion(robot, np.zeros(3)), free_start=motion(robot, np.zeros(3)).model.x_names)
+    found = among_obstacles(free, robot, (Sphere(0.1).at([2.5, 0.0, 0.0]),), pairs=())
+    assert len(found.constraints) == 3
+
+
+def test_a_goal_meets_an_obstacle_that_moves() -> None:
+    """It is clear at the start, and comes to where the goal is; time is counted in steps."""
+    robot, dt = chain(), 0.1
+    x, u, t = ca.SX.sym("x", 3), ca.SX.sym("u", 3), ca.SX.sym("t")
+    model = Model(name="chain", x=x, u=u, f=x + dt * u, dt=dt, t=t)
+    steps = OCP(name="steps", model=model, x0=np.zeros(3), horizon=20, running_cost=ca.sumsqr(u))
+    ball = Sphere(0.1).at(ca.vertcat(2.5, 2.0 - t, 0.0))
+    among_obstacles(steps, robot, (ball,), pairs=())
+    with pytest.raises(ProblemError, match=r"goal: clearance of rod3\[0\] and obstacles\[0\]"):
+        among_obstacles(steps, robot, (ball,), pairs=(), goal=np.zeros(3))
 
 
 @pytest.mark.parametrize(
