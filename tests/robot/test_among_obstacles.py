@@ -104,6 +104,7 @@ def test_links_that_touch_only_at_rest_are_kept() -> None:
     assert ("rod1", "rod3") in self_collision_pairs(chain(), rest=folded)
 
 
+@pytest.mark.slow
 def test_pairs_of_the_panda() -> None:
     pairs = self_collision_pairs(panda())
     assert ("panda_link0", "panda_hand") in pairs
@@ -143,6 +144,7 @@ def test_what_the_joints_do_not_move_has_no_row() -> None:
     assert any("link3" in name for name in names)
 
 
+@pytest.mark.slow
 def test_a_problem_of_torques_takes_obstacles() -> None:
     robot = panda()
     goal = READY + 0.5 * np.eye(7)[0]
