@@ -68,8 +68,10 @@ def animate_motion(
     if Path(path).suffix != ".html":
         raise ProblemError(f"{what}: {path} is no .html file")
     check_obstacles(obstacles, f"{what}: obstacles")
+    time = ca.SX.sym("t") if t is None else t
+    check_instance(time, ca.SX, f"{what}: t")
     per_second = check_positive(frames_per_second, f"{what}: frames_per_second")
-    frames = _frames(robot, motion, per_second, ca.SX.sym("t") if t is None else t, what)
+    frames = _frames(robot, motion, per_second, time, what)
     tip = robot.frames[-1] if frame is None else frame
     trail = frames.sampled(robot.position(frames.theta, tip), f"{what}: {tip}")
     links = placed_shapes(robot, frames.theta, link_shapes(robot, shapes))

@@ -50,7 +50,8 @@ def self_collision_pairs(
         return ()
     lower, upper = _ranges(robot)
     middle = (lower + upper) / 2.0
-    first = middle if rest is None else check_numbers(rest, robot.n, f"{robot.name}: rest")
+    what = f"{robot.name}: rest"
+    first = middle if rest is None else check_numbers(rest, robot.n, what, repeat=False)
     drawn = np.random.default_rng(_SEED).uniform(lower, upper, size=(_DRAWN, robot.n))
     q = ca.SX.sym("q", robot.n)
     least = [ca.mmin(rows) for rows in self_distances(robot, q, all_shapes, apart).values()]

@@ -238,6 +238,11 @@ def test_bad_input_is_named(change: dict, message: str) -> None:
         robot_clearances(chain(), **given)
 
 
+def test_a_rest_pose_of_a_wrong_size() -> None:
+    with pytest.raises(ProblemError, match="chain: rest has 2 entries, 3 are needed"):
+        self_collision_pairs(chain(), rest=[0.0, 0.0])
+
+
 def test_a_mesh_says_what_to_do() -> None:
     with pytest.raises(ProblemError, match=r"link 'column' has the mesh .*column\.stl.*shapes="):
         link_shapes(Robot.from_urdf(TREE))

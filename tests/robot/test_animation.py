@@ -150,7 +150,12 @@ def test_a_surface_is_closed_and_faces_outwards(shape: Shape) -> None:
         ({"frames_per_second": 0.0}, "frames"),
         ({"frames_per_second": 1e5}, "100001 frames, at most 3000"),
         ({"robot": panda()}, "3 states, and panda 7 joints"),
-        ({"motion": "a plan"}, "motion"),
+        ({"motion": "a plan"}, "animation: motion is a str"),
+        ({"motion": None}, "motion"),
+        ({"t": 0.0}, "animation: t is a float"),
+        ({"robot": "panda"}, "robot is a str"),
+        ({"obstacles": None}, "obstacles"),
+        ({"shapes": 5}, "shapes"),
     ],
 )
 def test_bad_input_is_named(solution: Solution, change: dict, message: str) -> None:
