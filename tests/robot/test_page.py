@@ -51,6 +51,7 @@ def test_the_motion_among_obstacles_is_clear_by_coal(page: dict[str, Any]) -> No
     held, robot = page["held"], page["robot"]
     verdict = evaluate(held)
     assert verdict.violation <= 1e-3
+    assert sum(c.expression.numel() for c in page["clear"].at("path")) == 105  # the page says it
     truth = verdict.truth
     instants = np.linspace(truth.t[0], truth.t[-1], 161)
     way = [np.interp(instants, truth.t, column) for column in truth.x.T]
