@@ -126,7 +126,7 @@ def rod(points: int) -> OCP:
 
 @pytest.mark.slow
 def test_the_limit_at_the_optimum_is_accepted_and_said() -> None:
-    solver = Collocation(25, degree=3, max_iterations=10, accuracy=1e99)
+    solver = Collocation(25, degree=3, max_iterations=10, tolerance=1e-13, accuracy=1e99)
     solution = solve(rod(100), solver)
     assert solution.status is Status.SOLVED
     assert "to an acceptable level: residual" in solution.message
