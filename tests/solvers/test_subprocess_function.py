@@ -243,8 +243,10 @@ def test_a_dropped_program_leaves_nothing(uncollected: None) -> None:
 
 @apart
 @pytest.mark.slow
-def test_many_dropped_programs_leave_nothing(uncollected: None) -> None:
-    builds(500)
+@pytest.mark.over_library
+@pytest.mark.parametrize("count", [100, 500])
+def test_many_dropped_programs_leave_nothing(uncollected: None, count: int) -> None:
+    builds(count)
 
 
 @apart
