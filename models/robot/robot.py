@@ -30,8 +30,9 @@ class Robot:
     .. math:: M(q) \ddot q + c(q, \dot q) + g(q) + d\,\dot q + f \tanh(\dot q / v_f) = \tau
 
     with the armature on the diagonal of M, damping d and Coulomb friction f. A joint that mimics
-    another has no coordinate; it moves, and loads, the one that it follows. Revolute and continuous
-    joints have their angle as coordinate [rad], prismatic ones their way [m].
+    another has no coordinate; it moves with the one that it follows, which bears its loads and its
+    friction too. Revolute and continuous joints have their angle as coordinate [rad], prismatic
+    ones their way [m].
 
     Every method takes coordinates as ``SX``, ``MX`` or numbers, columns (n,), and returns what it
     was given: an expression, or a ``DM``. What it computes is built once.
@@ -216,9 +217,13 @@ class Robot:
         return [rigid + self._friction(v) + ca.SX(np.asarray(self.armature)) * a]
 
     def _friction(self, v: ca.SX) -> ca.SX:
-        damping = ca.SX(np.array([joint.damping for joint in self.tree.joints]))
-        coulomb = ca.SX(np.array([joint.friction for joint in self.tree.joints]))
-        return damping * v + coulomb * ca.tanh(v / self.friction_speed)
+        """Return what all joints lose; one that mimics adds to the one that it follows."""
+        lost = ca.SX.zeros(self.n)
+        for body in self.tree.bodies:
+            speed = body.factor * v[body.coordinate]
+            own = body.damping * speed + body.friction * ca.tanh(speed / self.friction_speed)
+            lost[body.coordinate] += body.factor * own
+        return lost
 
     def _mass_matrix(self, q: ca.SX) -> ca.SX:
         rotors = ca.SX(np.diag(np.asarray(self.armature)))

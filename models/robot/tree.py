@@ -25,6 +25,8 @@ class Body:
         coordinate: which q moves it.
         factor: of q, other than 1 only for a joint that mimics.
         offset: added to it.
+        damping: viscous friction at the joint [N m s/rad] or [N s/m].
+        friction: Coulomb friction at it [N m] or [N].
         inertia: pseudo-inertia (4, 4) in the frame of the body.
     """
 
@@ -35,6 +37,8 @@ class Body:
     coordinate: int
     factor: float
     offset: float
+    damping: float
+    friction: float
     inertia: np.ndarray
 
 
@@ -126,6 +130,8 @@ def tree_of(description: Description) -> Tree:
                 coordinate=coordinate[follows.joint],
                 factor=follows.multiplier,
                 offset=follows.offset,
+                damping=joint.damping,
+                friction=joint.friction,
                 inertia=np.zeros((4, 4)),
             )
         )

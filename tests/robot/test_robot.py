@@ -107,6 +107,22 @@ def test_friction_and_armature_are_added() -> None:
     np.testing.assert_allclose(added, np.diag(rotors), atol=ROUNDING)
 
 
+def test_a_joint_that_mimics_brakes_the_one_that_it_follows() -> None:
+    """Twice as fast, and with twice the lever: 1 + 2 (10 * 2 + 3)."""
+    inertial = """<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0"
+        izz="1"/></inertial>"""
+    joint = (
+        """<joint name="{0}" type="continuous"><parent link="a"/><child link="{1}"/>{2}</joint>"""
+    )
+    leads = joint.format("leads", "b", '<dynamics damping="1"/>')
+    follows = '<dynamics damping="10" friction="3"/><mimic joint="leads" multiplier="2"/>'
+    robot = Robot.from_urdf(
+        f"""<robot name="geared"><link name="a"/><link name="b">{inertial}</link>
+        <link name="c">{inertial}</link>{leads}{joint.format("follows", "c", follows)}</robot>"""
+    )
+    assert float(robot.inverse_dynamics([0.0], [1.0], [0.0])) == pytest.approx(47.0)
+
+
 def test_regrouped_masses_move_no_torque(tree: Robot) -> None:
     q, v, a = (ca.SX(row) for row in sample(tree))
     gravity = np.asarray(tree.gravity)
