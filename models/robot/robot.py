@@ -15,12 +15,15 @@ from models.robot.description import Description, JointLimits, Pose
 from models.robot.inverse_dynamics import newton_euler
 from models.robot.kinematics import FramePose, attached, body_poses, geometric_jacobian
 from models.robot.locked import locked
-from models.robot.mass_matrix import composite_mass_matrix
+from models.robot.mass_matrix import composite_mass_matrix, singular_coordinate
 from models.robot.payload import Payload
 from models.robot.tree import Tree, tree_of
 from models.robot.urdf import read_urdf
 from ocp import ProblemError
 from ocp.internal import check_instance, check_numbers, check_positive
+
+# What M is called; and at how many places it is asked whether it is regular.
+_MASSES, _PLACES = "mass matrix", 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +188,7 @@ class Robot:
     def mass_matrix(self, q: Any) -> Any:
         """Return M(q) (n, n) [kg m^2], [kg m] or [kg], with the armature."""
         self._check_masses()
-        return self._call("mass matrix", lambda q: [self._mass_matrix(q)], q)[0]
+        return self._call(_MASSES, lambda q: [self._mass_matrix(q)], q)[0]
 
     def forward_dynamics(self, q: Any, v: Any, effort: Any) -> Any:
         """Return the accelerations (n,) that efforts τ cause at q, v: M a = τ - h, by L D L'."""
@@ -280,15 +283,25 @@ class Robot:
 
     def _check_masses(self) -> None:
         """Refuse dynamics where nothing would resist a joint."""
-        load = None if self.payload is None else self._frame(self.payload.frame)[0]
-        carries = {self.tree.bodies[i].joint for i in self.tree.inwards(load)}
-        for joint, armature in zip(self.tree.joints, np.asarray(self.armature), strict=True):
-            if self.tree.masses[joint.name] == 0.0 and not armature and joint.name not in carries:
-                raise ProblemError(
-                    f"{self.name}: joint '{joint.name}' moves link '{joint.child}', and neither it "
-                    "nor what hangs on it has a mass: add <inertial> to it, give an armature, or "
-                    "lock the joint; kinematics need no masses"
-                )
+        if self._unresisted is not None:
+            joint = self.tree.joints[self._unresisted]
+            raise ProblemError(
+                f"{self.name}: joint '{joint.name}' moves link '{joint.child}', and no inertia "
+                "resists it (the mass matrix is singular): add <inertial>, with moments of "
+                "inertia, to the link or what hangs on it, give an armature, or lock the joint; "
+                "kinematics need no masses"
+            )
+
+    @cached_property
+    def _unresisted(self) -> int | None:
+        """The joint whose pivot of M vanishes wherever it is asked for; what is unknown is 1."""
+        if not self.n:
+            return None
+        unknown = ca.SX(0, 1) if self.payload is None else self.payload.symbols
+        places = np.random.default_rng(0).uniform(-1.0, 1.0, (_PLACES, self.n))
+        found = [self._call(_MASSES, lambda q: [self._mass_matrix(q)], q)[0] for q in places]
+        matrices = [ca.evalf(ca.substitute(ca.SX(m), unknown, 1.0)) for m in found]
+        return singular_coordinate([np.array(matrix) for matrix in matrices])
 
 
 def _column(value: Any, n: int, what: str) -> Any:

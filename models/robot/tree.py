@@ -50,13 +50,11 @@ class Tree:
         bodies: what moves.
         joints: those that move by themselves, one a coordinate of q, in this order.
         frames: by the name of each link its body and its pose in it.
-        masses: by the name of each joint what hangs on it [kg], all further bodies included.
     """
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
     frames: dict[str, tuple[int, Pose]]
-    masses: dict[str, float]
 
     @property
     def n(self) -> int:
@@ -136,8 +134,7 @@ def tree_of(description: Description) -> Tree:
             )
         )
         frames[name] = len(bodies) - 1, turned.inverse
-    filled = _with_masses(bodies, frames, links)
-    return Tree(filled, tuple(own), frames, _hanging(filled))
+    return Tree(_with_masses(bodies, frames, links), tuple(own), frames)
 
 
 def _outwards(description: Description) -> Iterator[tuple[str, Joint]]:
@@ -220,11 +217,3 @@ def _with_masses(
             place = homogeneous(pose)
             total[i] += place @ inertia.pseudo_inertia @ place.T
     return tuple(replace(body, inertia=each) for body, each in zip(bodies, total, strict=True))
-
-
-def _hanging(bodies: tuple[Body, ...]) -> dict[str, float]:
-    mass = [float(body.inertia[3, 3]) for body in bodies]
-    for i in reversed(range(len(bodies))):
-        if bodies[i].parent >= 0:
-            mass[bodies[i].parent] += mass[i]
-    return {body.joint: m for body, m in zip(bodies, mass, strict=True)}

@@ -39,7 +39,6 @@ def test_what_it_consists_of(tree: Robot) -> None:
     assert len(tree.tree.bodies) == 6
     assert tree.limits.lower.tolist() == [-0.5, -np.inf, -1.0, 0.0]
     assert tree.limits.effort.tolist() == [300.0, 40.0, 30.0, 20.0]
-    assert tree.tree.masses["lift"] == pytest.approx(6 + 2 + 0.7 + 1.5 + 0.9 + 0.2 + 0.15)
 
 
 def test_the_jacobian_is_the_rate_of_the_pose(tree: Robot) -> None:
@@ -264,10 +263,31 @@ def test_what_no_mass_resists_has_kinematics_only() -> None:
         <joint name="turn" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
     robot = Robot.from_urdf(text)
     assert array(robot.position([0.3], "b")).tolist() == [0.0, 0.0, 0.0]
-    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and neither it nor"):
+    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and no inertia"):
         robot.inverse_dynamics([0.0], [0.0], [0.0])
     assert float(replace(robot, armature=2.0).mass_matrix([0.0])) == 2.0
     robot.carrying(Payload("b", 1.0, (0.0, 1.0, 0.0))).mass_matrix([0.0])
+
+
+def test_a_mass_on_the_axis_resists_nothing() -> None:
+    text = """<robot name="thin"><link name="a"/>
+        <link name="b"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>
+          <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+        <joint name="turn" type="continuous"><origin rpy="0.3 0.2 0.1"/><parent link="a"/>
+          <child link="b"/></joint></robot>"""
+    robot = Robot.from_urdf(text)
+    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and no inertia resists"):
+        robot.forward_dynamics([0.0], [0.0], [1.0])
+    replace(robot, armature=0.1).forward_dynamics([0.0], [0.0], [1.0])
+
+
+def test_a_heavy_follower_resists_for_the_one_that_it_follows() -> None:
+    text = """<robot name="geared"><link name="a"/><link name="b"/><link name="c"><inertial>
+        <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+        </link><joint name="leads" type="continuous"><parent link="a"/><child link="b"/></joint>
+        <joint name="follows" type="continuous"><parent link="a"/><child link="c"/>
+          <mimic joint="leads" multiplier="2"/></joint></robot>"""
+    assert float(Robot.from_urdf(text).mass_matrix([0.0])) == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
