@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._ldl import ldl_solve
+from models.robot.coordinates import checked_columns
 from models.robot.description import Description, JointLimits, Pose
 from models.robot.inverse_dynamics import newton_euler
 from models.robot.kinematics import FramePose, attached, body_poses, geometric_jacobian
@@ -267,7 +268,7 @@ class Robot:
     def _call(self, name: str, build: Callable[..., list[ca.SX]], *given: Any) -> list[Any]:
         """Return expressions of q (and v, and a or τ) at what is given; each is built once."""
         unknown = ca.SX(0, 1) if self.payload is None else self.payload.symbols
-        columns = [_column(value, self.n, f"{self.name}: {name}") for value in given]
+        columns = checked_columns(given, self.n, f"{self.name}: {name}", unknown)
         if name not in self._functions:
             symbols = [ca.SX.sym(letter, self.n) for letter in "qva"[: len(given)]]
             self._functions[name] = ca.Function("robot", [*symbols, unknown], build(*symbols))
@@ -275,9 +276,9 @@ class Robot:
         return list(self._functions[name].call([*columns, parameters], True, False))
 
     def _frame(self, frame: str) -> tuple[int, Pose]:
-        if frame not in self.tree.frames:
+        if not isinstance(frame, str) or frame not in self.tree.frames:
             raise ProblemError(
-                f"{self.name} has no frame '{frame}'; its frames are {', '.join(self.frames)}"
+                f"{self.name} has no frame {frame!r}; its frames are {', '.join(self.frames)}"
             )
         return self.tree.frames[frame]
 
@@ -302,13 +303,3 @@ class Robot:
         found = [self._call(_MASSES, lambda q: [self._mass_matrix(q)], q)[0] for q in places]
         matrices = [ca.evalf(ca.substitute(ca.SX(m), unknown, 1.0)) for m in found]
         return singular_coordinate([np.array(matrix) for matrix in matrices])
-
-
-def _column(value: Any, n: int, what: str) -> Any:
-    """Return coordinates (n,) as an expression, or as numbers."""
-    if isinstance(value, ca.SX | ca.MX):
-        if value.shape != (n, 1):
-            raise ProblemError(f"{what}: coordinates of shape {value.shape}, ({n}, 1) is needed")
-        return value
-    numbers = np.array(value) if isinstance(value, ca.DM) else value
-    return ca.DM(check_numbers(numbers, n, f"{what}: coordinates", repeat=False))

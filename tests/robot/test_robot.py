@@ -247,6 +247,9 @@ def test_a_frame_that_is_not_there_is_named() -> None:
         panda().pose(np.zeros(7), "panda_tcp")
     with pytest.raises(ProblemError, match="has no frame 'cup'"):
         panda().carrying(Payload("cup", 1.0))
+    names: Any = ["panda_link8"]
+    with pytest.raises(ProblemError, match="has no frame .'panda_link8'.; its frames are"):
+        panda().pose(np.zeros(7), names)
 
 
 def test_coordinates_of_another_size_are_refused(tree: Robot) -> None:
@@ -256,6 +259,12 @@ def test_coordinates_of_another_size_are_refused(tree: Robot) -> None:
         tree.mass_matrix(ca.SX.sym("q", 3))
     with pytest.raises(ProblemError, match="finite"):
         tree.mass_matrix([0.0, np.nan, 0.0, 0.0])
+    both: Any = ca.SX.sym("q", 4), ca.MX.sym("v", 4), np.zeros(4)
+    with pytest.raises(ProblemError, match="tree: inverse dynamics: coordinates are SX and MX"):
+        tree.inverse_dynamics(*both)
+    loaded = tree.carrying(Payload("left", ca.SX.sym("mass")))
+    with pytest.raises(ProblemError, match="coordinates are MX, and the payload has symbols"):
+        loaded.mass_matrix(ca.MX.sym("q", 4))
 
 
 def test_what_no_mass_resists_has_kinematics_only() -> None:
