@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import OCP, Program, Solution
-from ocp.internal import NormalForm, RunData, number_of, scaled, without_traces
+from ocp.internal import NormalForm, RunData, number_of, scaled
 from solvers.diagnose.terms import Terms
 from solvers.direct.multiple_shooting import MultipleShooting, MultipleShootingProgram
 
@@ -34,12 +34,11 @@ class SamplePoints:
     p: np.ndarray
 
     def evaluate(self, ocp: OCP, expression: ca.SX) -> np.ndarray:
-        """Return an expression at every point, (K, numel), see ``without_traces``."""
+        """Return an expression at every point, (K, numel)."""
         m, value = ocp.model, ca.densify(ca.vec(expression))
         function = ca.Function("value", [m.x, m.u, m.t, ocp.p], [value])
         found = function.map(len(self.t))(self.x.T, self.u.T, self.t[None, :], self.p.T)
-        rows = np.array(found).reshape(value.numel(), len(self.t), order="F").T
-        return without_traces(rows)
+        return np.array(found).reshape(value.numel(), len(self.t), order="F").T
 
     def __add__(self, other: "SamplePoints") -> "SamplePoints":
         """Return both."""
