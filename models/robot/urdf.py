@@ -8,6 +8,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from models._numbers import checked_tensor
 from models.robot.description import (
     BoxShape,
     Collision,
@@ -103,11 +104,7 @@ def _inertia(element: Element, what: str, tidy: float) -> Inertia:
         for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    least = np.linalg.eigvalsh(tensor)[0]
-    if least < -1e-12 * max(1.0, np.abs(tensor).max()):
-        raise ProblemError(
-            f"{what}: a principal moment of inertia is {least:.3g} kg m^2, it must be 0 or more"
-        )
+    checked_tensor(tensor, what)
     pose = _origin(element, what, tidy)
     return Inertia(mass, pose.translation, pose.rotation @ tensor @ pose.rotation.T)
 

@@ -248,7 +248,7 @@ def test_a_frame_that_is_not_there_is_named() -> None:
     with pytest.raises(ProblemError, match="has no frame 'cup'"):
         panda().carrying(Payload("cup", 1.0))
     names: Any = ["panda_link8"]
-    with pytest.raises(ProblemError, match="has no frame .'panda_link8'.; its frames are"):
+    with pytest.raises(ProblemError, match=r"has no frame \['panda_link8'\]; its"):
         panda().pose(np.zeros(7), names)
 
 
@@ -334,8 +334,10 @@ def test_joints_that_cannot_be_locked_are_named(tree: Robot, joints: dict, messa
     [
         (("left", -1.0), "payload at 'left': mass = -1.0"),
         (("left", 1.0, (0.0, 1.0)), "center has 2 entries"),
-        (("left", 1.0, (0.0, 0.0, 0.0), np.arange(9.0)), "tensor is not symmetric"),
+        (("left", 1.0, (0.0, 0.0, 0.0), np.arange(9.0).reshape(3, 3)), "tensor is not symmetric"),
         (("left", ca.SX.sym("m", 2)), "its mass has 2 entries"),
+        (("left", 1.0, (0.0, 0.0, 0.0), 0.1), r"tensor has shape \(\), \(3, 3\) is needed"),
+        (("left", 1.0, (0.0, 0.0, 0.0), -np.eye(3)), "principal moment of inertia is -1 kg m"),
     ],
 )
 def test_wrong_payloads_are_refused(arguments: tuple, message: str) -> None:

@@ -240,14 +240,14 @@ def test_instantaneous_control_takes_the_same_error() -> None:
         (
             lambda p, r: PositionTask("tip", p, directions=[1.0, 0.0, 0.0]),
             {},
-            r"directions have shape \(3,\), \(m, 3\)",
+            r"directions has shape \(3,\), \(m, 3\)",
         ),
         (
             lambda p, r: PositionTask("tip", p, directions=[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
             {},
             "directions depend on each other",
         ),
-        (lambda p, r: OrientationTask("tip", 2 * r), {}, "rotation is no rotation"),
+        (lambda p, r: OrientationTask("tip", 2 * r), {}, "rotation is not orthonormal"),
         (
             lambda p, r: PositionTask(**{"frame": 3, "path": p}),
             {},
