@@ -34,7 +34,8 @@ def checked_matrix(
     fits = given.ndim == 2 and given.shape[1] == columns and given.shape[0] > 0
     if not fits or rows not in (None, given.shape[0]):
         needed = f"({'m' if rows is None else rows}, {columns})"
-        raise ProblemError(f"{what} has shape {given.shape}, {needed} is needed")
+        empty = " (it is empty)" if given.shape[:1] == (0,) else ""
+        raise ProblemError(f"{what} has shape {given.shape}{empty}, {needed} is needed")
     return check_numbers(given, given.size, what, repeat=False).reshape(given.shape)
 
 

@@ -64,11 +64,13 @@ class Pose(Portable):
 
 
 def coordinates(value: Coordinates, what: str) -> ca.SX | np.ndarray:
-    """Return three numbers, or an ``SX`` of three entries.
+    """Return three numbers, or an ``SX`` of three entries; a list may hold both.
 
     Raises:
         ProblemError: on a wrong size and on NaN.
     """
+    if isinstance(value, list | tuple) and any(isinstance(entry, ca.SX) for entry in value):
+        value = ca.vertcat(*value)
     if isinstance(value, ca.MX):
         raise ProblemError(f"{what} is an MX, numbers or an SX are needed")
     if not isinstance(value, ca.SX):

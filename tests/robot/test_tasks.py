@@ -247,6 +247,16 @@ def test_instantaneous_control_takes_the_same_error() -> None:
             {},
             "directions depend on each other",
         ),
+        (
+            lambda p, r: PositionTask("tip", p, directions=np.zeros((0, 3))),
+            {},
+            "it is empty",
+        ),
+        (
+            lambda p, r: PositionTask("tip", p, directions=[[1.0, 0.0], [1.0]]),
+            {},
+            "directions has rows of different lengths",
+        ),
         (lambda p, r: OrientationTask("tip", 2 * r), {}, "rotation is not orthonormal"),
         (
             lambda p, r: PositionTask(**{"frame": 3, "path": p}),
@@ -282,6 +292,25 @@ def test_an_orientation_half_a_turn_away_is_named(robot: Robot) -> None:
     rotation = here(robot, REST, HAND)[1] @ np.diag([-1.0, -1.0, 1.0])
     with pytest.raises(ProblemError, match=r"less than half a turn away"):
         redundancy_ocp(robot, OrientationTask(HAND, rotation), theta0=REST, horizon=1.0)
+
+
+def test_an_orientation_may_turn_by_half_a_turn_on_the_way(robot: Robot) -> None:
+    rotation = here(robot, REST, HAND)[1]
+
+    def around(t: ca.SX) -> ca.SX:
+        c, s = ca.cos(np.pi * t), ca.sin(np.pi * t)
+        about_z = ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+        return ca.mtimes(ca.SX(rotation), about_z)
+
+    ocp = redundancy_ocp(robot, OrientationTask(HAND, around), theta0=REST, horizon=2.0)
+    assert ocp.model.nx == robot.n
+
+
+def test_a_path_that_breaks_on_the_way_is_named(robot: Robot) -> None:
+    start = ca.DM(here(robot, REST, HAND)[0])
+    broken = PositionTask(HAND, lambda t: start + ca.vertcat(0, 0, 1 - ca.sqrt(1 - t)) / 100)
+    with pytest.raises(ProblemError, match="the task is not finite at t = 1"):
+        redundancy_ocp(robot, broken, theta0=REST, horizon=2.0)
 
 
 def test_a_planar_arm_takes_no_task_in_space() -> None:
