@@ -1,6 +1,7 @@
 """Where a body is: a rotation and a position."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -70,7 +71,8 @@ def coordinates(value: Coordinates, what: str) -> ca.SX | np.ndarray:
         ProblemError: on a wrong size and on NaN.
     """
     if isinstance(value, list | tuple) and any(isinstance(entry, ca.SX) for entry in value):
-        value = ca.vertcat(*value)
+        entries: list[Any] = list(value)
+        value = ca.vertcat(*entries)
     if isinstance(value, ca.MX):
         raise ProblemError(f"{what} is an MX, numbers or an SX are needed")
     if not isinstance(value, ca.SX):
