@@ -224,6 +224,18 @@ def test_the_panda_moves_from_the_default_guess_by_every_backend() -> None:
             {"robot": arm().carrying(Payload("lower", ca.SX.sym("load")))},
             "parameters: in the robot, 'load' is a symbol without a value",
         ),
+        (
+            {"parameters": Parameter("load", ca.SX.sym("load"), 1.0)},
+            "parameters is a Parameter, tuple or list",
+        ),
+        (
+            {"robot": arm().locked({"shoulder": 0.0, "elbow": 0.0}), "start": [], "goal": []},
+            "arm has no joint that moves",
+        ),
+        (
+            {"form": "torque", "steps": None, "acceleration_weight": 1e-3},
+            "knows no acceleration",
+        ),
     ],
 )
 def test_wrong_input_is_named(options: dict[str, Any], message: str) -> None:
@@ -236,3 +248,8 @@ def test_wrong_input_is_named(options: dict[str, Any], message: str) -> None:
     }
     with pytest.raises(ProblemError, match=message):
         torque_ocp(**(given | options))
+
+
+def test_the_form_in_torques_has_usable_defaults() -> None:
+    problem = torque_ocp(arm(), START, GOAL, horizon=1.0, form="torque")
+    assert problem.model.nu == 2

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -53,6 +54,11 @@ def test_a_load_that_the_controller_does_not_know_leaves_an_error(plan: Solution
         ({"robot": 3}, "robot is an int"),
         ({"plant": 3}, "plant is an int"),
         ({"solution": 3}, "solution is an int"),
+        (
+            {"plant": arm().carrying(Payload("lower", ca.SX.sym("mass")))},
+            "tracked motion: plant: mass of its payload is a symbol",
+        ),
+        ({"robot": arm(effort=0.0)}, "effort: the limit of joint '.*' is 0"),
     ],
 )
 def test_wrong_input_is_named(plan: Solution, change: dict[str, Any], message: str) -> None:
