@@ -46,6 +46,14 @@ def test_a_load_that_the_controller_does_not_know_leaves_an_error(plan: Solution
     assert known.wanted.max() > EFFORT
 
 
+def test_what_is_beyond_the_limits_is_not_given(plan: Solution) -> None:
+    """A weak robot asks for as much, is given less, and falls behind."""
+    weak = arm(effort=EFFORT / 4.0)
+    found = tracked_motion(weak, plan)
+    assert found.share.max() > 1.0
+    assert np.abs(found.error).max() > 10 * np.abs(tracked_motion(arm(), plan).error).max()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
