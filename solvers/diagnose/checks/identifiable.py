@@ -121,7 +121,7 @@ def _finding(subject: DiagnosedProblem, where: list[int], what: str) -> Finding:
         Cause.UNIDENTIFIABLE,
         Severity.WARNING,
         names,
-        f"No {what} changes when {when}: the optimiser leaves {left} where the guess was. Fix {one} "
-        f"as a number, {more}, or add a cost on what is known beforehand.",
+        f"No {what} changes when {when}: the optimiser leaves {left} where the guess was. Fix "
+        f"{one} as a number, {more}, or add a cost on what is known beforehand.",
         float(len(names)),
     )
