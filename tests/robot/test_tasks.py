@@ -17,7 +17,7 @@ from models.robot import (
     panda,
     rotation_error,
 )
-from ocp import OCP, ProblemError, evaluate, solve
+from ocp import OCP, Box, ProblemError, evaluate, solve
 from solvers import Collocation, MultipleShooting, PrioritisedKinematics, Schuetz, polish, track
 from tests.tolerances import CERTIFIED, DERIVATIVE, RESIDUAL, ROUNDING, STEP
 
@@ -292,6 +292,20 @@ def test_an_orientation_half_a_turn_away_is_named(robot: Robot) -> None:
     rotation = here(robot, REST, HAND)[1] @ np.diag([-1.0, -1.0, 1.0])
     with pytest.raises(ProblemError, match=r"less than half a turn away"):
         redundancy_ocp(robot, OrientationTask(HAND, rotation), theta0=REST, horizon=1.0)
+
+
+def test_the_limits_of_a_robot_are_those_of_its_problem(robot: Robot) -> None:
+    task, limits = PositionTask(HAND, here(robot, REST, HAND)[0]), robot.limits
+    ocp = redundancy_ocp(robot, task, theta0=REST, horizon=1.0, form="velocity")
+    assert ocp.model.x_names == robot.joints
+    np.testing.assert_array_equal(np.asarray(ocp.state_bounds.lower), limits.lower)
+    np.testing.assert_array_equal(np.asarray(ocp.control_bounds.upper), limits.velocity)
+    (fast,) = redundancy_ocp(robot, task, theta0=REST, horizon=1.0).constraints
+    np.testing.assert_array_equal(np.asarray(fast.lower), -limits.velocity)
+    free = {"joint_bounds": Box(), "velocity_bounds": Box()}
+    bare = redundancy_ocp(robot, task, theta0=REST, horizon=1.0, **free)
+    assert not bare.constraints
+    assert not bare.state_bounds.is_active
 
 
 def test_an_orientation_may_turn_by_half_a_turn_on_the_way(robot: Robot) -> None:
