@@ -17,6 +17,7 @@ from models.robot import (
     panda,
     rotation_error,
 )
+from models.robot_path import _reach
 from ocp import OCP, Box, ProblemError, evaluate, solve
 from solvers import Collocation, MultipleShooting, PrioritisedKinematics, Schuetz, polish, track
 from tests.tolerances import CERTIFIED, DERIVATIVE, RESIDUAL, ROUNDING, STEP
@@ -332,3 +333,19 @@ def test_a_planar_arm_takes_no_task_in_space() -> None:
         redundancy_ocp(
             PlanarArm((1.0, 1.0, 1.0)), PositionTask("tip", [1, 1, 1]), theta0=[0, 1, 1], horizon=1
         )
+
+
+def test_a_joint_that_slides_reaches_as_far_as_it_may() -> None:
+    """Links of 1 m and 0.5 m with a slide of at most 0.7 m between them: 2.2 m."""
+    text = """<robot name="slider"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+        <link name="tip"/>
+        <joint name="yaw" type="continuous"><parent link="a"/><child link="b"/>
+          <axis xyz="0 0 1"/></joint>
+        <joint name="out" type="prismatic"><origin xyz="1 0 0"/><parent link="b"/><child link="c"/>
+          <axis xyz="1 0 0"/><limit lower="-0.2" upper="0.7" velocity="1" effort="1"/></joint>
+        <joint name="turn" type="continuous"><parent link="c"/><child link="d"/>
+          <axis xyz="0 0 1"/></joint>
+        <joint name="end" type="fixed"><origin xyz="0.5 0 0"/><parent link="d"/>
+          <child link="tip"/></joint></robot>"""
+    robot = Robot.from_urdf(text)
+    assert _reach(robot, "tip")[1] == pytest.approx(2.2)

@@ -13,6 +13,7 @@ from ocp import (
     Box,
     Constraint,
     Delay,
+    Grid,
     Guess,
     Model,
     Parameter,
@@ -298,3 +299,10 @@ def test_a_parameter_of_the_name_is_no_trouble():
     lake = fishing(parameters=(Parameter("levels", scale, 1.0),), terminal_cost=scale)
     found = switched(lake, {"fishing": (0, 1)}, MultipleShooting(20))
     assert found.solution.parameters["levels"] == 1.0
+
+
+def test_the_bound_is_that_of_the_widest_interval():
+    grid = Grid((0.0, 0.1, 0.5, 0.6, 1.0))
+    found = switched(fishing(), {"fishing": (0, 1)}, MultipleShooting(grid))
+    assert found.bound == pytest.approx(12.0 * 0.4)
+    assert found.deviation <= found.bound
