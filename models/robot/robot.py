@@ -169,9 +169,8 @@ class Robot:
         .. math:: (\dot p, \omega) = J(q) \, \dot q
         """
         body, pose = self._frame(frame)
-        return self._call(
-            f"jacobian of {frame}", lambda q: [geometric_jacobian(self.tree, q, body, pose)], q
-        )[0]
+        name = f"jacobian of {frame}"
+        return self._call(name, lambda q: [geometric_jacobian(self.tree, q, body, pose)], q)[0]
 
     # -- dynamics -------------------------------------------------------------------
 
@@ -194,9 +193,8 @@ class Robot:
     def forward_dynamics(self, q: Any, v: Any, effort: Any) -> Any:
         """Return the accelerations (n,) that efforts τ cause at q, v: M a = τ - h, by L D L'."""
         self._check_masses()
-        return self._call("forward dynamics", lambda *given: [self._forward(*given)], q, v, effort)[
-            0
-        ]
+        given = q, v, effort
+        return self._call("forward dynamics", lambda *z: [self._forward(*z)], *given)[0]
 
     def forward_dynamics_derivatives(self, q: Any, v: Any, effort: Any) -> tuple[Any, ...]:
         r"""Return the accelerations a (n,) and their Jacobians in q, v and τ, each (n, n).
@@ -288,9 +286,8 @@ class Robot:
             joint = self.tree.joints[self._unresisted]
             raise ProblemError(
                 f"{self.name}: joint '{joint.name}' moves link '{joint.child}', and no inertia "
-                "resists it (the mass matrix is singular): add <inertial>, with moments of "
-                "inertia, to the link or what hangs on it, give an armature, or lock the joint; "
-                "kinematics need no masses"
+                "resists it (the mass matrix is singular): add <inertial> with moments of inertia, "
+                "give an armature, or lock the joint; kinematics need no masses"
             )
 
     @cached_property

@@ -115,9 +115,9 @@ def torque_ocp(
     check_choice(torque_at, ("middle", "ends"), f"{name}: torque_at")
     check_parameters(robot, parameters, name)
     duration = check_positive(horizon, f"{name}: horizon")
-    usual = 0.0 if form == "torque" else 1e-3
-    given = usual if acceleration_weight is None else acceleration_weight
-    weight = check_not_negative(given, f"{name}: acceleration_weight")
+    weight = 0.0 if form == "torque" else 1e-3
+    if acceleration_weight is not None:
+        weight = check_not_negative(acceleration_weight, f"{name}: acceleration_weight")
     ends = [
         checked_configuration(robot, q, f"{name}: {w}")
         for q, w in ((start, "start"), (goal, "goal"))

@@ -123,8 +123,8 @@ def _step(robot: Robot, plant: Robot, h: float, stiffness: float, damping: float
     asked = robot.inverse_dynamics(q, v, a)
     given = ca.fmin(ca.fmax(asked, -limits), limits)
 
-    def rate(x: ca.SX, share: ca.SX) -> ca.SX:
+    def rate(x: ca.SX, _: ca.SX | float) -> ca.SX:
         return ca.vertcat(x[n:], plant.forward_dynamics(x[:n], x[n:], given))
 
-    after = RK4()(rate, x, ca.SX(0), h)
+    after = RK4()(rate, x, 0.0, h)
     return ca.Function("sampling_interval", [x, plan], [after, asked])

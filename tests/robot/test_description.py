@@ -13,6 +13,7 @@ from ocp import ProblemError
 
 TURN = Joint("turn", "continuous", "a", "b", Pose.identity(), np.array([0.0, 0.0, 1.0]))
 LINKS = (Link("a"), Link("b", Inertia(1.0, np.zeros(3), np.eye(3))))
+ODD: Any = {"name": "odd", "links": LINKS, "joints": ("turn",)}
 
 
 def test_lists_are_taken() -> None:
@@ -40,7 +41,7 @@ def test_lists_are_taken() -> None:
         (lambda: Limits(velocity=-1.0), "limits: velocity = -1.0"),
         (lambda: Mimic("turn", np.nan), "mimic of 'turn': multiplier"),
         (lambda: Description("none", (), ()), "none: there are no links"),
-        (lambda: Description("odd", LINKS, ("turn",)), "odd: an entry of joints is a str, Joint"),
+        (lambda: Description(**ODD), "odd: an entry of joints is a str, Joint"),
     ],
 )
 def test_what_is_wrong_is_named(build: Callable[[], object], message: str) -> None:

@@ -303,7 +303,7 @@ def test_the_limits_of_a_robot_are_those_of_its_problem(robot: Robot) -> None:
     np.testing.assert_array_equal(np.asarray(ocp.control_bounds.upper), limits.velocity)
     (fast,) = redundancy_ocp(robot, task, theta0=REST, horizon=1.0).constraints
     np.testing.assert_array_equal(np.asarray(fast.lower), -limits.velocity)
-    free = {"joint_bounds": Box(), "velocity_bounds": Box()}
+    free: dict[str, Any] = {"joint_bounds": Box(), "velocity_bounds": Box()}
     bare = redundancy_ocp(robot, task, theta0=REST, horizon=1.0, **free)
     assert not bare.constraints
     assert not bare.state_bounds.is_active
