@@ -94,9 +94,10 @@ def redundancy_ocp(
         clearance: every link keeps at least this distance [m] from the core of every
             obstacle (a disc's centre), as path constraint ``"clearance"``; one number, or
             one for each obstacle, such as its radius; ``None``: no such constraint.
-        joint_bounds: limits of θ [rad].
-        velocity_bounds: limits of dθ/dt [rad/s]: control bounds of the velocity form, path
-            constraint ``"joint velocity"`` of the null-space form.
+        joint_bounds: limits of θ [rad]; None: those of a robot, of a planar arm none. ``Box()``:
+            none in any case.
+        velocity_bounds: limits of dθ/dt [rad/s], None as above: control bounds of the velocity
+            form, path constraint ``"joint velocity"`` of the null-space form.
         free_start: require only that the end effector starts on the path (initial
             constraint ``"start on path"``, thesis 3.46); ``theta0`` is then a guess.
         parameters: parameters and signals in the path or in the obstacles.
@@ -104,7 +105,8 @@ def redundancy_ocp(
         name: what people call the problem.
 
     Returns:
-        the problem, with states ``theta_i`` [rad] and controls [rad/s].
+        the problem, with states ``theta_i`` [rad], of a robot named as its joints, and controls
+        [rad/s].
 
     Raises:
         ProblemError: for numbers out of range, a path that starts elsewhere than the arm
@@ -130,11 +132,11 @@ def redundancy_ocp(
     elif obstacles:
         raise ProblemError(f"{name}: obstacles of the plane are none of a Robot: leave them out")
 
-    theta = ca.SX.sym("theta", arm.n)
+    theta = _angles(arm)
     error = task.error(theta)
     rate = task.desired_rate - gain * error
-    limits = velocity_bounds or Box()
-    motion = _motion(task.jacobian(theta), rate, cost, form, limits)
+    positions, velocities = _limits(arm)
+    motion = _motion(task.jacobian(theta), rate, cost, form, velocity_bounds or velocities)
     avoided = obstacles if distance_cost and k > 0.0 else ()
     avoidance = ca.SX(0)
     if distance_cost and isinstance(arm, PlanarArm):
@@ -152,12 +154,27 @@ def redundancy_ocp(
         horizon=duration,
         running_cost=avoidance + posture + motion.effort,
         control_bounds=motion.control_bounds,
-        state_bounds=joint_bounds or Box(),
+        state_bounds=joint_bounds or positions,
         constraints=tuple(constraints),
         invariants=(Constraint("task error", error, 0.0, 0.0),),
         parameters=tuple(parameters),
         smoothness=_smoothness(distance_cost, avoided, posture_costs),
     )
+
+
+def _angles(arm: PlanarArm | Robot) -> ca.SX:
+    """Return the symbols of the joints (n,)."""
+    if isinstance(arm, Robot):
+        return ca.vertcat(*[ca.SX.sym(joint) for joint in arm.joints])
+    return ca.SX.sym("theta", arm.n)
+
+
+def _limits(arm: PlanarArm | Robot) -> tuple[Box, Box]:
+    """Return where the joints may be, and how fast they may move."""
+    if not isinstance(arm, Robot):
+        return Box(), Box()
+    known = arm.limits
+    return Box(known.lower, known.upper), Box(-known.velocity, known.velocity)
 
 
 @dataclass(frozen=True, eq=False)

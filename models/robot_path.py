@@ -71,13 +71,16 @@ class RobotPath(Portable):
             )
         at_start = ca.substitute(error, theta, ca.SX(ca.DM(theta0)))
         what = f"{self.name}: the task"
-        times, errors = sampled(at_start, self.t, self.horizon, self.parameters, what)
-        broken = np.flatnonzero(~np.isfinite(errors).all(axis=1))
-        if broken.size:
+        _, errors = sampled(at_start, self.t, self.horizon, self.parameters, what)
+        if not np.isfinite(errors[0]).all():
             raise ProblemError(
-                f"{what} is not finite at t = {times[broken[0]]:g} s, seen from theta0; an "
-                "orientation must be less than half a turn away"
+                f"{what} is not finite at t = 0 s, seen from theta0; an orientation must be less "
+                "than half a turn away"
             )
+        # From theta0 a task may well be half a turn away later: on the way the arm is elsewhere.
+        times, rates = sampled(self.desired_rate, self.t, self.horizon, self.parameters, what)
+        for k in np.flatnonzero(~np.isfinite(rates).all(axis=1))[:1]:
+            raise ProblemError(f"{what} is not finite at t = {times[k]:g} s: so is its rate")
         self._refuse_gap(errors[0], must_start_on_path)
         self._refuse_singular(theta, theta0)
         self._refuse_unreachable()

@@ -25,7 +25,7 @@ from ocp.codegen.compile import (
     compiled,
 )
 from ocp.expressions.foreign_functions import external
-from ocp.expressions.piecewise_constant import deciding, piecewise_constant
+from ocp.expressions.piecewise_constant import deciding, piecewise_constant, without_traces
 from ocp.files.append import append_line
 from ocp.files.checksum import with_checksum, without_checksum
 from ocp.files.draft import replacing, write_file
@@ -195,5 +195,6 @@ __all__ = [
     "with_checksum",
     "with_row_sizes",
     "without_checksum",
+    "without_traces",
     "write_file",
 ]

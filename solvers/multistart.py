@@ -90,6 +90,7 @@ def multistart(
     """Solve from several starts and return the distinct local optima, best first.
 
     The first start is the problem's own; the others are ``random_guesses``, of phases for each.
+    Unknown constants that phases share are not drawn: they start from their declared values.
 
     Args:
         ocp: the problem, or ``Phases``; built once.

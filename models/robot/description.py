@@ -1,11 +1,18 @@
 """What a robot description says: links, joints, masses and shapes, as data."""
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from models._numbers import checked_rotation, checked_tensor, vector
+from ocp import ProblemError
+from ocp.internal import check_choice, check_instance, check_not_negative, check_real
+
 JointType: TypeAlias = Literal["fixed", "revolute", "continuous", "prismatic"]
+
+# How far the length of an axis may be from 1.
+_UNIT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,10 +22,18 @@ class Pose:
     Args:
         rotation: R (3, 3), its columns are the axes of the frame.
         translation: p (3,) [m], its origin.
+
+    Raises:
+        ProblemError: on what is no rotation, or not three numbers.
     """
 
     rotation: np.ndarray
     translation: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        object.__setattr__(self, "rotation", checked_rotation(self.rotation, "pose: rotation"))
+        object.__setattr__(self, "translation", vector(self.translation, 3, "pose: translation"))
 
     def __matmul__(self, inner: "Pose") -> "Pose":
         """Return the pose of what is at ``inner`` in this frame."""
@@ -46,11 +61,20 @@ class Inertia:
         center: centre of mass (3,) [m], in the frame of the link.
         tensor: moments of inertia (3, 3) [kg m^2] about the centre of mass, in the axes of the
             link.
+
+    Raises:
+        ProblemError: on a mass or a principal moment below 0, and what is not symmetric.
     """
 
     mass: float
     center: np.ndarray
     tensor: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_not_negative(self.mass, "inertia: mass")
+        object.__setattr__(self, "center", vector(self.center, 3, "inertia: center"))
+        object.__setattr__(self, "tensor", checked_tensor(self.tensor, "inertia"))
 
     @property
     def pseudo_inertia(self) -> np.ndarray:
@@ -126,6 +150,14 @@ class Link:
     inertia: Inertia | None = None
     collisions: tuple[Collision, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Check what they are."""
+        check_instance(self.name, str, "link: name")
+        if self.inertia is not None:
+            check_instance(self.inertia, Inertia, f"link '{self.name}': inertia")
+        for each in self.collisions:
+            check_instance(each, Collision, f"link '{self.name}': a collision")
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -135,6 +167,13 @@ class Limits:
     upper: float = np.inf
     velocity: float = np.inf
     effort: float = np.inf
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("velocity", "effort"):
+            check_not_negative(getattr(self, name), f"limits: {name}", finite=False)
+        if not self.lower < self.upper:
+            raise ProblemError(f"limits: lower = {self.lower} is not below upper = {self.upper}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +201,12 @@ class Mimic:
     multiplier: float = 1.0
     offset: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        check_instance(self.joint, str, "mimic: joint")
+        check_real(self.multiplier, f"mimic of '{self.joint}': multiplier")
+        check_real(self.offset, f"mimic of '{self.joint}': offset")
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -179,6 +224,10 @@ class Joint:
         damping: viscous friction [N m s/rad] or [N s/m].
         friction: Coulomb friction [N m] or [N].
         mimic: None where the joint moves by itself.
+
+    Raises:
+        ProblemError: naming the joint: an unknown type, an axis of another length than 1, friction
+            below 0.
     """
 
     name: str
@@ -192,6 +241,23 @@ class Joint:
     friction: float = 0.0
     mimic: Mimic | None = None
 
+    def __post_init__(self) -> None:
+        """Check type, axis and friction."""
+        check_instance(self.name, str, "joint: name")
+        what = f"joint '{self.name}'"
+        check_choice(self.type, get_args(JointType), f"{what}: type")
+        check_instance(self.origin, Pose, f"{what}: origin")
+        check_instance(self.limits, Limits, f"{what}: limits")
+        if self.mimic is not None:
+            check_instance(self.mimic, Mimic, f"{what}: mimic")
+        for name in ("damping", "friction"):
+            check_not_negative(getattr(self, name), f"{what}: {name}")
+        axis = vector(self.axis, 3, f"{what}: axis")
+        length = float(np.linalg.norm(axis))
+        if self.type != "fixed" and abs(length - 1.0) > _UNIT:
+            raise ProblemError(f"{what}: its axis has the length {length:g}, 1 is needed")
+        object.__setattr__(self, "axis", axis)
+
 
 @dataclass(frozen=True, eq=False)
 class Description:
@@ -201,8 +267,22 @@ class Description:
         name: of the robot.
         links: in the order of the file.
         joints: in the order of the file.
+
+    Raises:
+        ProblemError: if there is no link, or something else among links and joints.
     """
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
+
+    def __post_init__(self) -> None:
+        """Check that there are links, and what all are."""
+        check_instance(self.name, str, "description: name")
+        for what, kind in (("links", Link), ("joints", Joint)):
+            check_instance(getattr(self, what), (tuple, list), f"{self.name}: {what}")
+            object.__setattr__(self, what, tuple(getattr(self, what)))
+            for each in getattr(self, what):
+                check_instance(each, kind, f"{self.name}: an entry of {what}")
+        if not self.links:
+            raise ProblemError(f"{self.name}: there are no links; one is the base")

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ocp import ProblemError
+from ocp.internal import check_instance
 
 _SCHEME = "package://"
 
@@ -21,6 +22,8 @@ def resolve_file(
     Raises:
         ProblemError: naming the package that is not among ``packages``.
     """
+    check_instance(file, str, "resolve_file: file")
+    check_instance(packages, Mapping, "resolve_file: packages")
     if file.startswith(_SCHEME):
         package, _, rest = file.removeprefix(_SCHEME).partition("/")
         if package not in packages:

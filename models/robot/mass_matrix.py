@@ -1,9 +1,15 @@
 """The mass matrix of a robot, by composite bodies."""
 
+from collections.abc import Sequence
+
 import casadi as ca
+import numpy as np
 
 from models.robot.motion import Placed, placed
 from models.robot.tree import Tree
+
+# A pivot below this share of the largest entry is rounding: nothing resists there.
+_NO_PIVOT = 1e-12
 
 
 def composite_mass_matrix(tree: Tree, inertias: list[ca.SX], q: ca.SX) -> ca.SX:
@@ -76,3 +82,21 @@ def _moved(each: Placed, inertia: ca.SX) -> ca.SX:
     across = ca.mtimes(first + mass * p, p.T) + ca.mtimes(p, first.T)
     h = first + mass * p
     return ca.vertcat(ca.horzcat(second + across, h), ca.horzcat(h.T, mass))
+
+
+def singular_coordinate(matrices: Sequence[np.ndarray]) -> int | None:
+    """Return the coordinate that nothing resists at any place of mass matrices; None: none is."""
+    shares = [_pivots(matrix) / (np.abs(matrix).max() or 1.0) for matrix in matrices]
+    most = np.max(shares, axis=0)
+    return int(most.argmin()) if most.min() <= _NO_PIVOT else None
+
+
+def _pivots(matrix: np.ndarray) -> np.ndarray:
+    """Return D (n,) of L D L'; what follows a pivot that is not positive is 0."""
+    left, found = matrix.copy(), np.zeros(len(matrix))
+    for i, pivot in enumerate(np.diagonal(left)):
+        if pivot <= 0.0:
+            break
+        found[i] = pivot
+        left[i + 1 :, i + 1 :] -= np.outer(left[i + 1 :, i], left[i, i + 1 :]) / pivot
+    return found

@@ -5,6 +5,8 @@ import math
 import casadi as ca
 import numpy as np
 
+from ocp import ProblemError
+
 # Below this sin^2 of half the angle the series is used; its rest is then below rounding.
 _SMALL = 1e-2
 _TERMS = 9
@@ -30,7 +32,14 @@ def rotation_error(desired: ca.SX | np.ndarray, actual: ca.SX) -> ca.SX:
     Args:
         desired: R_d (3, 3).
         actual: R (3, 3).
+
+    Raises:
+        ProblemError: on another shape.
     """
+    for matrix, what in ((desired, "desired"), (actual, "actual")):
+        shape = matrix.shape if isinstance(matrix, ca.SX | ca.DM) else np.shape(matrix)
+        if shape != (3, 3):
+            raise ProblemError(f"rotation error: {what} has shape {shape}, (3, 3) is needed")
     error = ca.mtimes(ca.SX(desired).T, actual)
     turned = ca.vertcat(
         error[2, 1] - error[1, 2], error[0, 2] - error[2, 0], error[1, 0] - error[0, 1]

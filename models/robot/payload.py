@@ -6,10 +6,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from models._numbers import checked_tensor, vector
 from models.robot.description import Pose
 from models.robot.tree import homogeneous
 from ocp import ProblemError
-from ocp.internal import Portable, check_instance, check_not_negative, check_numbers
+from ocp.internal import Portable, check_instance, check_not_negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,7 @@ class Payload(Portable):
             the link; 0: a point mass.
 
     Raises:
-        ProblemError: if a number is wrong, or the tensor is not symmetric.
+        ProblemError: if a number is wrong, or the tensor is not symmetric or has a moment below 0.
     """
 
     frame: str
@@ -45,10 +46,10 @@ class Payload(Portable):
             if self.center.numel() != 3:
                 raise ProblemError(f"{what}: its center has {self.center.numel()} entries, not 3")
         else:
-            check_numbers(self.center, 3, f"{what}: center", repeat=False)
-        tensor = check_numbers(self.tensor, 9, f"{what}: tensor").reshape(3, 3)
-        if not np.allclose(tensor, tensor.T):
-            raise ProblemError(f"{what}: its tensor is not symmetric: {tensor.tolist()}")
+            vector(self.center, 3, f"{what}: center")
+        is_point = np.ndim(self.tensor) == 0 and self.tensor == 0.0
+        tensor = np.zeros((3, 3)) if is_point else self.tensor
+        object.__setattr__(self, "tensor", checked_tensor(tensor, what))
 
     @property
     def symbols(self) -> ca.SX:
@@ -64,7 +65,7 @@ class Payload(Portable):
         """Return it (4, 4) in the frame of the body in which the link has this pose."""
         c = self._center
         h = self.mass * c
-        tensor = np.broadcast_to(np.asarray(self.tensor, dtype=float).reshape(-1), 9).reshape(3, 3)
+        tensor = np.asarray(self.tensor)
         about_center = ca.SX(np.trace(tensor) / 2.0 * np.eye(3) - tensor)
         second = about_center + ca.mtimes(h, c.T)
         own = ca.vertcat(ca.horzcat(second, h), ca.horzcat(h.T, ca.SX(self.mass)))

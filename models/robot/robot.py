@@ -11,16 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from models._ldl import ldl_solve
+from models.robot.coordinates import checked_columns
 from models.robot.description import Description, JointLimits, Pose
 from models.robot.inverse_dynamics import newton_euler
 from models.robot.kinematics import FramePose, attached, body_poses, geometric_jacobian
 from models.robot.locked import locked
-from models.robot.mass_matrix import composite_mass_matrix
+from models.robot.mass_matrix import composite_mass_matrix, singular_coordinate
 from models.robot.payload import Payload
 from models.robot.tree import Tree, tree_of
 from models.robot.urdf import read_urdf
 from ocp import ProblemError
 from ocp.internal import check_instance, check_numbers, check_positive
+
+# What M is called; and at how many places it is asked whether it is regular.
+_MASSES, _PLACES = "mass matrix", 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +34,9 @@ class Robot:
     .. math:: M(q) \ddot q + c(q, \dot q) + g(q) + d\,\dot q + f \tanh(\dot q / v_f) = \tau
 
     with the armature on the diagonal of M, damping d and Coulomb friction f. A joint that mimics
-    another has no coordinate; it moves, and loads, the one that it follows. Revolute and continuous
-    joints have their angle as coordinate [rad], prismatic ones their way [m].
+    another has no coordinate; it moves with the one that it follows, which bears its loads and its
+    friction too. Revolute and continuous joints have their angle as coordinate [rad], prismatic
+    ones their way [m].
 
     Every method takes coordinates as ``SX``, ``MX`` or numbers, columns (n,), and returns what it
     was given: an expression, or a ``DM``. What it computes is built once.
@@ -164,9 +169,8 @@ class Robot:
         .. math:: (\dot p, \omega) = J(q) \, \dot q
         """
         body, pose = self._frame(frame)
-        return self._call(
-            f"jacobian of {frame}", lambda q: [geometric_jacobian(self.tree, q, body, pose)], q
-        )[0]
+        name = f"jacobian of {frame}"
+        return self._call(name, lambda q: [geometric_jacobian(self.tree, q, body, pose)], q)[0]
 
     # -- dynamics -------------------------------------------------------------------
 
@@ -184,14 +188,13 @@ class Robot:
     def mass_matrix(self, q: Any) -> Any:
         """Return M(q) (n, n) [kg m^2], [kg m] or [kg], with the armature."""
         self._check_masses()
-        return self._call("mass matrix", lambda q: [self._mass_matrix(q)], q)[0]
+        return self._call(_MASSES, lambda q: [self._mass_matrix(q)], q)[0]
 
     def forward_dynamics(self, q: Any, v: Any, effort: Any) -> Any:
         """Return the accelerations (n,) that efforts τ cause at q, v: M a = τ - h, by L D L'."""
         self._check_masses()
-        return self._call("forward dynamics", lambda *given: [self._forward(*given)], q, v, effort)[
-            0
-        ]
+        given = q, v, effort
+        return self._call("forward dynamics", lambda *z: [self._forward(*z)], *given)[0]
 
     def forward_dynamics_derivatives(self, q: Any, v: Any, effort: Any) -> tuple[Any, ...]:
         r"""Return the accelerations a (n,) and their Jacobians in q, v and τ, each (n, n).
@@ -216,9 +219,13 @@ class Robot:
         return [rigid + self._friction(v) + ca.SX(np.asarray(self.armature)) * a]
 
     def _friction(self, v: ca.SX) -> ca.SX:
-        damping = ca.SX(np.array([joint.damping for joint in self.tree.joints]))
-        coulomb = ca.SX(np.array([joint.friction for joint in self.tree.joints]))
-        return damping * v + coulomb * ca.tanh(v / self.friction_speed)
+        """Return what all joints lose; one that mimics adds to the one that it follows."""
+        lost = ca.SX.zeros(self.n)
+        for body in self.tree.bodies:
+            speed = body.factor * v[body.coordinate]
+            own = body.damping * speed + body.friction * ca.tanh(speed / self.friction_speed)
+            lost[body.coordinate] += body.factor * own
+        return lost
 
     def _mass_matrix(self, q: ca.SX) -> ca.SX:
         rotors = ca.SX(np.diag(np.asarray(self.armature)))
@@ -259,7 +266,7 @@ class Robot:
     def _call(self, name: str, build: Callable[..., list[ca.SX]], *given: Any) -> list[Any]:
         """Return expressions of q (and v, and a or τ) at what is given; each is built once."""
         unknown = ca.SX(0, 1) if self.payload is None else self.payload.symbols
-        columns = [_column(value, self.n, f"{self.name}: {name}") for value in given]
+        columns = checked_columns(given, self.n, f"{self.name}: {name}", unknown)
         if name not in self._functions:
             symbols = [ca.SX.sym(letter, self.n) for letter in "qva"[: len(given)]]
             self._functions[name] = ca.Function("robot", [*symbols, unknown], build(*symbols))
@@ -267,30 +274,29 @@ class Robot:
         return list(self._functions[name].call([*columns, parameters], True, False))
 
     def _frame(self, frame: str) -> tuple[int, Pose]:
-        if frame not in self.tree.frames:
+        if not isinstance(frame, str) or frame not in self.tree.frames:
             raise ProblemError(
-                f"{self.name} has no frame '{frame}'; its frames are {', '.join(self.frames)}"
+                f"{self.name} has no frame {frame!r}; its frames are {', '.join(self.frames)}"
             )
         return self.tree.frames[frame]
 
     def _check_masses(self) -> None:
         """Refuse dynamics where nothing would resist a joint."""
-        load = None if self.payload is None else self._frame(self.payload.frame)[0]
-        carries = {self.tree.bodies[i].joint for i in self.tree.inwards(load)}
-        for joint, armature in zip(self.tree.joints, np.asarray(self.armature), strict=True):
-            if self.tree.masses[joint.name] == 0.0 and not armature and joint.name not in carries:
-                raise ProblemError(
-                    f"{self.name}: joint '{joint.name}' moves link '{joint.child}', and neither it "
-                    "nor what hangs on it has a mass: add <inertial> to it, give an armature, or "
-                    "lock the joint; kinematics need no masses"
-                )
+        if self._unresisted is not None:
+            joint = self.tree.joints[self._unresisted]
+            raise ProblemError(
+                f"{self.name}: joint '{joint.name}' moves link '{joint.child}', and no inertia "
+                "resists it (the mass matrix is singular): add <inertial> with moments of inertia, "
+                "give an armature, or lock the joint; kinematics need no masses"
+            )
 
-
-def _column(value: Any, n: int, what: str) -> Any:
-    """Return coordinates (n,) as an expression, or as numbers."""
-    if isinstance(value, ca.SX | ca.MX):
-        if value.shape != (n, 1):
-            raise ProblemError(f"{what}: coordinates of shape {value.shape}, ({n}, 1) is needed")
-        return value
-    numbers = np.array(value) if isinstance(value, ca.DM) else value
-    return ca.DM(check_numbers(numbers, n, f"{what}: coordinates", repeat=False))
+    @cached_property
+    def _unresisted(self) -> int | None:
+        """The joint whose pivot of M vanishes wherever it is asked for; what is unknown is 1."""
+        if not self.n:
+            return None
+        unknown = ca.SX(0, 1) if self.payload is None else self.payload.symbols
+        places = np.random.default_rng(0).uniform(-1.0, 1.0, (_PLACES, self.n))
+        found = [self._call(_MASSES, lambda q: [self._mass_matrix(q)], q)[0] for q in places]
+        matrices = [ca.evalf(ca.substitute(ca.SX(m), unknown, 1.0)) for m in found]
+        return singular_coordinate([np.array(matrix) for matrix in matrices])

@@ -9,15 +9,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from models._numbers import checked_matrix, checked_rotation, vector
 from models.robot.orientation import rotation_error
 from models.robot.robot import Robot
 from ocp import ProblemError
-from ocp.internal import check_instance, check_numbers
+from ocp.internal import check_instance
 
 # From time t [s], an SX, to a position (3,) [m] or a rotation (3, 3).
 InTime: TypeAlias = Callable[[ca.SX], Any]
-
-_RIGHT = 1e-9  # how far a rotation may be from an orthogonal matrix
 
 
 class SpaceTask(ABC):
@@ -70,14 +69,12 @@ class PositionTask(SpaceTask):
     def __post_init__(self) -> None:
         """Check frame and directions."""
         check_instance(self.frame, str, "position task: frame")
-        _check_constant(self.path, (3, 1), self._what)
+        if not callable(self.path):
+            vector(self.path, 3, self._what)
         if self.directions is None:
             return
         what = f"position task of '{self.frame}': directions"
-        rows = check_numbers(self.directions, np.size(self.directions), what)
-        if np.ndim(self.directions) != 2 or np.shape(self.directions)[1] != 3:
-            raise ProblemError(f"{what} have shape {np.shape(self.directions)}, (m, 3) is needed")
-        matrix = rows.reshape(-1, 3)
+        matrix = checked_matrix(self.directions, (None, 3), what)
         if np.linalg.matrix_rank(matrix) < len(matrix):
             raise ProblemError(f"{what} depend on each other: {matrix.tolist()}")
         object.__setattr__(self, "directions", matrix)
@@ -129,12 +126,8 @@ class OrientationTask(SpaceTask):
     def __post_init__(self) -> None:
         """Check frame and rotation."""
         check_instance(self.frame, str, "orientation task: frame")
-        _check_constant(self.rotation, (3, 3), self._what)
         if not callable(self.rotation):
-            matrix = np.asarray(self.rotation, dtype=float)
-            off = np.abs(matrix.T @ matrix - np.eye(3)).max()
-            if off > _RIGHT or np.linalg.det(matrix) < 0.0:
-                raise ProblemError(f"{self._what} is no rotation: {matrix.tolist()}")
+            checked_rotation(self.rotation, self._what)
 
     def error(self, robot: Robot, q: ca.SX, t: ca.SX) -> ca.SX:
         """Return the turn from R_d(t) to R(q) (3,) [rad], in the axes of R_d."""
@@ -200,13 +193,6 @@ class PoseTask(SpaceTask):
     @property
     def _parts(self) -> tuple[PositionTask, OrientationTask]:
         return PositionTask(self.frame, self.path), OrientationTask(self.frame, self.rotation)
-
-
-def _check_constant(given: Any, shape: tuple[int, int], what: str) -> None:
-    """Refuse numbers that do not fit; what a function returns is seen when it is called."""
-    if not callable(given):
-        size = shape[0] * shape[1]
-        check_numbers(given, size, what, repeat=False)
 
 
 def _at(given: Any, t: ca.SX, shape: tuple[int, int], what: str) -> ca.SX:

@@ -13,6 +13,7 @@ from ocp.internal import check_instance, check_numbers, check_positive
 
 def check_parameters(robot: Robot, parameters: Sequence[Parameter | Signal], name: str) -> None:
     """Refuse what has no value at run time."""
+    check_instance(parameters, (tuple, list), f"{name}: parameters")
     for entry in parameters:
         check_instance(entry, (Parameter, Signal), f"{name}: an entry of parameters")
     known = {s.element_hash() for entry in parameters for s in ca.vertsplit(entry.symbol)}

@@ -42,7 +42,7 @@ def torque_ocp(
     effort_share: float = 1.0,
     velocity_share: float = 1.0,
     jerk: ArrayLike | None = None,
-    acceleration_weight: float = 1e-3,
+    acceleration_weight: float | None = None,
     parameters: Sequence[Parameter | Signal] = (),
     name: str = "torque-controlled motion",
 ) -> OCP:
@@ -97,7 +97,7 @@ def torque_ocp(
         velocity_share: part of the limits of velocity that may be used, at most 1.
         jerk: limit of the rate of q'', a number or (n,) [rad/s^3] or [m/s^3]; q'' then starts at
             0. None: none. In the form ``"acceleration"`` only.
-        acceleration_weight: w, 0 or more.
+        acceleration_weight: w, 0 or more; None: 1e-3, and 0 in the form ``"torque"``.
         parameters: of what in the robot is a symbol, such as the mass of a payload.
         name: of the problem.
 
@@ -109,11 +109,15 @@ def torque_ocp(
     Source: inverse dynamics as a path equation [Ferrolho et al. 2021]; limits in ``JointLimits``.
     """
     check_instance(robot, Robot, f"{name}: robot")
+    if not robot.n:
+        raise ProblemError(f"{name}: {robot.name} has no joint that moves")
     check_choice(form, ("acceleration", "torque"), f"{name}: form")
     check_choice(torque_at, ("middle", "ends"), f"{name}: torque_at")
     check_parameters(robot, parameters, name)
     duration = check_positive(horizon, f"{name}: horizon")
-    weight = check_not_negative(acceleration_weight, f"{name}: acceleration_weight")
+    weight = 0.0 if form == "torque" else 1e-3
+    if acceleration_weight is not None:
+        weight = check_not_negative(acceleration_weight, f"{name}: acceleration_weight")
     ends = [
         checked_configuration(robot, q, f"{name}: {w}")
         for q, w in ((start, "start"), (goal, "goal"))

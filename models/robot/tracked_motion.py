@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 
 from models.robot.robot import Robot
-from ocp import ProblemError, Solution
+from models.robot.torque_checks import usable_limit
+from ocp import RK4, ProblemError, Solution
 from ocp.internal import check_instance, check_not_negative, check_positive
 
 
@@ -17,10 +18,10 @@ class TrackedMotion:
     Attributes:
         t: instants (K + 1,) [s].
         q: where it was (K + 1, n) [rad] or [m].
-        v: how fast (K + 1, n).
+        v: how fast (K + 1, n) [rad/s] or [m/s].
         wanted: what the controller asked for, held from one instant to the next (K, n) [N m] or
             [N]; what is beyond the limits of the robot was not given.
-        error: distance of q from the plan (K + 1, n).
+        error: q less the plan (K + 1, n) [rad] or [m].
         share: largest part of its limit of effort that each joint was asked for (n,); 0 where it
             has none. Above 1 the motors could not follow.
     """
@@ -60,13 +61,19 @@ def tracked_motion(
 
     Raises:
         ProblemError: if the plan is of another robot or without accelerations, or holds its
-            controls in another way.
+            controls in another way; if a payload has symbols, or a limit of effort is 0.
 
     Source: [Luh, Walker & Paul 1980] for the recursion that makes this cheap enough to control.
     """
     moving = robot if plant is None else plant
     for each, what in ((robot, "robot"), (moving, "plant")):
         check_instance(each, Robot, f"tracked motion: {what}")
+        unknown = None if each.payload is None else each.payload.symbols
+        if unknown is not None and unknown.numel():
+            raise ProblemError(
+                f"tracked motion: {what}: {', '.join(map(str, ca.vertsplit(unknown)))} of its "
+                "payload is a symbol; give it a number: carrying(Payload(frame, 1.5))"
+            )
     check_instance(solution, Solution, "tracked motion: solution")
     duration = solution.t[-1] - solution.t[0]
     steps = int(np.ceil(duration / check_positive(period, "tracked motion: period") - 1e-9))
@@ -76,13 +83,13 @@ def tracked_motion(
     ]
     t = np.linspace(0.0, duration, steps + 1)
     wanted = _plan(robot, solution, t)
+    limits = usable_limit(robot, robot.limits.effort, 1.0, "tracked motion: effort")
     n, start = robot.n, solution.x[0]
     step = _step(robot, moving, duration / steps, gains[0], gains[1])
     states, efforts = step.mapaccum(steps)(start, wanted[:-1].T)
     x = np.vstack([start, np.array(states).T])
     asked = np.array(efforts).T.reshape(steps, n)
-    limits = robot.limits.effort
-    share = np.abs(asked).max(axis=0) / np.where(limits > 0.0, limits, np.inf)
+    share = np.abs(asked).max(axis=0) / limits
     return TrackedMotion(t, x[:, :n], x[:, n:], asked, x[:, :n] - wanted[:, :n], share)
 
 
@@ -116,12 +123,8 @@ def _step(robot: Robot, plant: Robot, h: float, stiffness: float, damping: float
     asked = robot.inverse_dynamics(q, v, a)
     given = ca.fmin(ca.fmax(asked, -limits), limits)
 
-    def slope(x: ca.SX) -> ca.SX:
+    def rate(x: ca.SX, _: ca.SX | float) -> ca.SX:
         return ca.vertcat(x[n:], plant.forward_dynamics(x[:n], x[n:], given))
 
-    k1 = slope(x)
-    k2 = slope(x + h / 2.0 * k1)
-    k3 = slope(x + h / 2.0 * k2)
-    k4 = slope(x + h * k3)
-    after = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    after = RK4()(rate, x, 0.0, h)
     return ca.Function("sampling_interval", [x, plan], [after, asked])

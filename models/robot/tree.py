@@ -25,6 +25,8 @@ class Body:
         coordinate: which q moves it.
         factor: of q, other than 1 only for a joint that mimics.
         offset: added to it.
+        damping: viscous friction at the joint [N m s/rad] or [N s/m].
+        friction: Coulomb friction at it [N m] or [N].
         inertia: pseudo-inertia (4, 4) in the frame of the body.
     """
 
@@ -35,6 +37,8 @@ class Body:
     coordinate: int
     factor: float
     offset: float
+    damping: float
+    friction: float
     inertia: np.ndarray
 
 
@@ -46,13 +50,11 @@ class Tree:
         bodies: what moves.
         joints: those that move by themselves, one a coordinate of q, in this order.
         frames: by the name of each link its body and its pose in it.
-        masses: by the name of each joint what hangs on it [kg], all further bodies included.
     """
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
     frames: dict[str, tuple[int, Pose]]
-    masses: dict[str, float]
 
     @property
     def n(self) -> int:
@@ -126,12 +128,13 @@ def tree_of(description: Description) -> Tree:
                 coordinate=coordinate[follows.joint],
                 factor=follows.multiplier,
                 offset=follows.offset,
+                damping=joint.damping,
+                friction=joint.friction,
                 inertia=np.zeros((4, 4)),
             )
         )
         frames[name] = len(bodies) - 1, turned.inverse
-    filled = _with_masses(bodies, frames, links)
-    return Tree(filled, tuple(own), frames, _hanging(filled))
+    return Tree(_with_masses(bodies, frames, links), tuple(own), frames)
 
 
 def _outwards(description: Description) -> Iterator[tuple[str, Joint]]:
@@ -214,11 +217,3 @@ def _with_masses(
             place = homogeneous(pose)
             total[i] += place @ inertia.pseudo_inertia @ place.T
     return tuple(replace(body, inertia=each) for body, each in zip(bodies, total, strict=True))
-
-
-def _hanging(bodies: tuple[Body, ...]) -> dict[str, float]:
-    mass = [float(body.inertia[3, 3]) for body in bodies]
-    for i in reversed(range(len(bodies))):
-        if bodies[i].parent >= 0:
-            mass[bodies[i].parent] += mass[i]
-    return {body.joint: m for body, m in zip(bodies, mass, strict=True)}

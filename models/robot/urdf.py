@@ -8,6 +8,7 @@ from xml.parsers import expat
 
 import numpy as np
 
+from models._numbers import checked_tensor
 from models.robot.description import (
     BoxShape,
     Collision,
@@ -64,22 +65,29 @@ def read_urdf(source: str | Path, *, tidy: float = 1e-9) -> Description:
 
 def _root(source: str | Path) -> Element:
     check_instance(source, (str, Path), "URDF: source")
+    builder = TreeBuilder()
+    try:
+        given, encoding = _bytes_of(source)
+        # Without namespaces: many descriptions have prefixes, of simulators, that nobody declares.
+        parser = expat.ParserCreate(encoding)
+        parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+        parser.Parse(given, True)
+    except OSError as error:
+        raise ProblemError(f"URDF: the file cannot be read: {error}") from error
+    except (expat.ExpatError, LookupError, UnicodeError, ValueError) as error:
+        raise ProblemError(f"URDF: this is no XML: {error}") from error
+    return builder.close()
+
+
+def _bytes_of(source: str | Path) -> tuple[bytes, str | None]:
+    """Return the description and its encoding; None: the one that a file declares itself."""
     text = str(source)
     if isinstance(source, Path) or not ("<" in text or "\n" in text):
         path = Path(source)
         if not path.is_file():
             raise ProblemError(f"URDF: there is no file {path}")
-        text = path.read_text(encoding="utf-8")
-    builder = TreeBuilder()
-    # Without namespaces: many descriptions have prefixes, of simulators, that they do not declare.
-    parser = expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
-    try:
-        # As bytes: text that declares its own encoding would be refused.
-        parser.Parse(text.strip("\ufeff \t\r\n").encode(), True)
-    except expat.ExpatError as error:
-        raise ProblemError(f"URDF: this is no XML: {error}") from error
-    return builder.close()
+        return path.read_bytes().lstrip(), None
+    return text.strip("\ufeff \t\r\n").encode(), "utf-8"
 
 
 def _link(element: Element, tidy: float) -> Link:
@@ -103,11 +111,7 @@ def _inertia(element: Element, what: str, tidy: float) -> Inertia:
         for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     )
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    least = np.linalg.eigvalsh(tensor)[0]
-    if least < -1e-12 * max(1.0, np.abs(tensor).max()):
-        raise ProblemError(
-            f"{what}: a principal moment of inertia is {least:.3g} kg m^2, it must be 0 or more"
-        )
+    checked_tensor(tensor, what)
     pose = _origin(element, what, tidy)
     return Inertia(mass, pose.translation, pose.rotation @ tensor @ pose.rotation.T)
 

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull as QHull
 from scipy.spatial import QhullError
 
+from models._numbers import checked_matrix
 from ocp import ProblemError
-from ocp.internal import check_numbers
 
 # Faces whose normals and offsets agree to this, relative to the size, are one; a body that is
 # thinner than this has no inside.
@@ -79,11 +79,7 @@ def checked_points(points: ArrayLike, what: str) -> np.ndarray:
     Raises:
         ProblemError: on a wrong shape, NaN, fewer than four points, and points in one plane.
     """
-    shape = np.shape(points)
-    if len(shape) != 2 or shape[1] != 3 or shape[0] == 0:
-        empty = " (it is empty)" if shape[:1] == (0,) else ""
-        raise ProblemError(f"{what} have shape {shape}{empty}, (k >= 4, 3) is needed")
-    found = check_numbers(np.asarray(points).reshape(-1), 3 * shape[0], what).reshape(shape)
+    found = checked_matrix(points, (None, 3), what)
     if len(found) < 4:
         raise ProblemError(f"{what} are {len(found)}, at least 4 are needed; take a Capsule")
     away = found - found.mean(axis=0)

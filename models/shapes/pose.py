@@ -1,18 +1,17 @@
 """Where a body is: a rotation and a position."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import vector
+from models._numbers import checked_rotation, vector
 from ocp import ProblemError
 from ocp.internal import Portable
 
 Coordinates = ca.SX | ArrayLike
-# What R'R may differ from the unit matrix by: rounded entries are refused, rounding is not.
-_ORTHONORMAL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +65,14 @@ class Pose(Portable):
 
 
 def coordinates(value: Coordinates, what: str) -> ca.SX | np.ndarray:
-    """Return three numbers, or an ``SX`` of three entries.
+    """Return three numbers, or an ``SX`` of three entries; a list may hold both.
 
     Raises:
         ProblemError: on a wrong size and on NaN.
     """
+    if isinstance(value, list | tuple) and any(isinstance(entry, ca.SX) for entry in value):
+        entries: list[Any] = list(value)
+        value = ca.vertcat(*entries)
     if isinstance(value, ca.MX):
         raise ProblemError(f"{what} is an MX, numbers or an SX are needed")
     if not isinstance(value, ca.SX):
@@ -84,21 +86,11 @@ def _rotation(value: Coordinates) -> ca.SX | np.ndarray:
     what = "pose: rotation"
     if isinstance(value, ca.MX):
         raise ProblemError(f"{what} is an MX, numbers or an SX are needed")
-    shape = value.shape if isinstance(value, ca.SX | ca.DM) else np.shape(value)
-    if shape != (3, 3):
-        raise ProblemError(f"{what} has shape {shape}, (3, 3) is needed")
-    if isinstance(value, ca.SX):
-        return value
-    matrix = vector(np.asarray(value).reshape(-1), 9, what).reshape(3, 3)
-    away = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
-    if away > _ORTHONORMAL:
-        raise ProblemError(
-            f"{what} is not orthonormal: R'R differs from the unit matrix by {away:.3g}; "
-            "normalise its columns"
-        )
-    if np.linalg.det(matrix) < 0.0:
-        raise ProblemError(f"{what} is a reflection (its determinant is -1): turn one column round")
-    return matrix
+    if not isinstance(value, ca.SX):
+        return checked_rotation(value, what)
+    if value.shape != (3, 3):
+        raise ProblemError(f"{what} has shape {value.shape}, (3, 3) is needed")
+    return value
 
 
 def _expression(value: Coordinates) -> ca.SX:

@@ -30,11 +30,13 @@ def places_on_segments(
 
     From the products of u, v, neither zero, and r = q - p: s on the whole lines, cut to [0, 1];
     t for it, cut; s for that, cut [Ericson 2005, 5.1.9]. Of parallel segments one of the nearest
-    pairs is taken.
+    pairs is taken: where they are not quite parallel, from the end of the first at which the lines
+    approach each other.
     """
     across = uu * vv - uv**2
     crosses = across > PARALLEL * uu * vv
-    s = clamped(crosses * (ur * vv - vr * uv) / (across + TINY))
+    towards = ur * vv - vr * uv
+    s = clamped(crosses * towards / (across + TINY)) + (crosses < (towards > 0.0))
     t = clamped((uv * s - vr) / vv)
     return clamped((ur + uv * t) / uu), t, crosses
 

@@ -233,10 +233,11 @@ class HalfSpace(Shape):
         """Check the numbers."""
         super().__post_init__()
         normal = vector(self.normal, 3, "HalfSpace: normal")
-        length = float(np.linalg.norm(normal))
-        if length == 0.0:
+        largest = float(np.abs(normal).max())
+        if largest == 0.0:
             raise ProblemError("HalfSpace: normal has length zero; it points out of the half-space")
-        object.__setattr__(self, "normal", normal / length)
+        normal = normal / largest  # so that no square is beyond all numbers
+        object.__setattr__(self, "normal", normal / np.linalg.norm(normal))
         offset = vector(self.offset, 1, "HalfSpace: offset")
         object.__setattr__(self, "offset", float(offset[0]))
 

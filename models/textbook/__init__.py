@@ -2,7 +2,6 @@
 
 from models.textbook.algae import periodic_algae
 from models.textbook.around_discs import around_discs
-from models.textbook.bioreactor import bioreactor
 from models.textbook.bouncing_ball import bouncing_ball
 from models.textbook.brachistochrone import brachistochrone
 from models.textbook.car import car_in_arcs, car_minimum_time
@@ -69,7 +68,6 @@ __all__ = [
     "alpha_pinene",
     "around_discs",
     "beam",
-    "bioreactor",
     "bouncing_ball",
     "bounded_ocp",
     "brachistochrone",

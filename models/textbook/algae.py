@@ -23,7 +23,8 @@ def periodic_algae() -> OCP:
     with the light μ = max(0, sin(2π t/10))², ν = 0.1 s/(0.05 + s), and (y, s, b)(10) =
     (y, s, b)(0). Algae y in a pond feed, by the flow u, the bacteria b on what is dissolved, s. At
     the start y, b >= 1; where the day starts is free, and the ends are coupled (``start(x)``).
-    Optimum: 0.614134 (the cost is its negative). Problem: [Bonnans et al. 2017].
+    Optimum: 0.614134 (the cost is its negative). Problem: [Bonnans et al. 2017], after
+    [Bayen, Mairet, Martinon & Sebbah 2015].
     """
     y, s, b, u, t = (ca.SX.sym(name) for name in ("algae", "dissolved", "bacteria", "flow", "t"))
     # Squared after the cut: at dawn and dusk the first derivative is continuous, the second is not.

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from ocp import OCP, Guess, Measurement, Model, Unknown
+from ocp import OCP, RK4, Guess, Measurement, Model, Unknown
 
 TIMES = np.linspace(0.0, 15.0, 61)
 # log10 of the viral load.
@@ -62,9 +62,6 @@ def hiv() -> OCP:
 def _simulated(rate: ca.Function) -> np.ndarray:
     """Return equally spaced states of the model with the guess of its rates, by RK4 steps."""
     x, h = ca.SX.sym("x", 3), TIMES[-1] / _STEPS
-    first = rate(x)
-    second = rate(x + h / 2.0 * first)
-    third = rate(x + h / 2.0 * second)
-    after = x + h / 6.0 * (first + 2.0 * second + 2.0 * third + rate(x + h * third))
+    after = RK4()(lambda z, _: rate(z), x, 0.0, h)
     step = ca.Function("step", [x], [after]).mapaccum(_STEPS)
     return np.vstack([START, np.array(step(START)).T[_STEPS // _ROWS - 1 :: _STEPS // _ROWS]])

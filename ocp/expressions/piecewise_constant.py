@@ -7,11 +7,14 @@ and differentiable: a distance is, where the features change that it is measured
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 # How the value is called in its Function: so an expression says what it is made of.
 _CHOICE = "choice"
 # A slope that changes no value, and whose square is zero.
 _HARDLY = 1e-200
+# What is smaller comes of that slope, times any weight; no derivative of a problem is that small.
+_TRACE = 1e-100
 
 
 def piecewise_constant(name: str, given: Any, choice: Any) -> ca.Function:
@@ -40,3 +43,12 @@ def deciding(node: ca.SX) -> ca.Function | None:
         return None
     function = node.dep(0).which_function()
     return function if function.name_out(0) == _CHOICE else None
+
+
+def without_traces(values: np.ndarray) -> np.ndarray:
+    """Return numbers with 0 in place of what is left of a decision's derivative.
+
+    To be asked of derivatives before it is asked whether they are zero, or how large they are
+    against each other.
+    """
+    return np.where(np.abs(values) < _TRACE, 0.0, values)

@@ -239,6 +239,13 @@ class Steps(Portable):
     inner: np.ndarray
     value: np.ndarray
 
+    def __post_init__(self) -> None:
+        """Check that there is a value for each part of the horizon."""
+        if len(self.value) != len(self.inner) + 1:
+            raise ProblemError(
+                f"steps '{self.name}': {len(self.value)} values, {len(self.inner) + 1} are needed"
+            )
+
     @property
     def knots(self) -> np.ndarray:
         """Instants in [0, 1] between which it is constant."""

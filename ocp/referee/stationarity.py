@@ -75,7 +75,7 @@ def _averaged(
     steps = np.diff(truth.t)
     middle = (truth.t[1:] + truth.t[:-1]) / 2
     interval = np.clip(np.searchsorted(nodes, middle) - 1, 0, len(nodes) - 2)
-    gradient, weight = np.zeros_like(u), np.zeros(len(u))
+    gradient, weight = np.zeros(u.shape), np.zeros(len(u))
     if solution.control_kind == "held":
         np.add.at(gradient, interval, g0 + g1)
         np.add.at(weight, interval, steps)

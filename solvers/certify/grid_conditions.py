@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 from scipy.optimize import lsq_linear
 
 from ocp import RK4, Solution
-from ocp.internal import Transcription, sizes_of
+from ocp.internal import Transcription, sizes_of, without_traces
 from solvers.certify.certificate import Check, Verdict
 
 # A bound this close, relative to its size and the typical one, is taken as active.
@@ -101,7 +101,7 @@ def _point(transcription: Transcription, solution: Solution) -> _Point:
     )
     unit, cost = _sizes(transcription, solution)
     g, slope, jacobian = (np.array(a) for a in first(w, p))
-    jacobian = jacobian * unit
+    jacobian = without_traces(jacobian) * unit
     in_g, signs_g = _active(g.ravel(), bounds["lbg"], bounds["ubg"], _lengths(jacobian))
     in_w, signs_w = _active(w, bounds["lbx"], bounds["ubx"], unit)
     lengths = _lengths(jacobian[in_g])

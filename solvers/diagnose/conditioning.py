@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ocp.internal import without_traces
 from solvers.diagnose.subject import DiagnosedProblem
 
 # A bound this close, relative to 1 + abs(bound), is taken as active.
@@ -88,7 +89,8 @@ def _matrix(subject: DiagnosedProblem, w: np.ndarray, free: np.ndarray) -> np.nd
     weights[on] = np.linalg.lstsq(rows.T, -slope, rcond=_DEPENDENT)[0]
     upper = np.array(nlp.get_function("nlp_hess_l")(w, p, 1.0, weights))[np.ix_(free, free)]
     hessian = upper + np.triu(upper, 1).T
-    return np.block([[hessian, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    whole = np.block([[hessian, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    return without_traces(whole)
 
 
 def _balance(matrix: np.ndarray) -> np.ndarray:

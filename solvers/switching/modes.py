@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,8 @@ from ocp.internal import check_instance
 
 # More modes than this are no switches any more: each is a control of the relaxed problem.
 _MOST = 64
+# Of so many choices those that constraints allow are looked for.
+_MOST_CHOICES = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +56,23 @@ class Modes:
         index = tuple(i for i, name in enumerate(names) if name in levels)
         each = [_checked(ocp, i, levels[names[i]]) for i in index]
         _refuse(ocp, index)
-        values = np.array(list(product(*each)))
-        return cls(index, *_allowed(ocp, index, values))
+        return cls(index, *_allowed(ocp, index, _choices(ocp, each)))
 
     @property
     def count(self) -> int:
         """Number of modes M."""
         return len(self.values)
+
+
+def _choices(ocp: OCP, each: Sequence[Sequence[float]]) -> np.ndarray:
+    """Return all choices of one value of each control, (M, m)."""
+    count = prod(len(values) for values in each)
+    if count > _MOST_CHOICES:
+        raise UnsupportedProblem(
+            f"{ocp.name}: {count} choices of levels, before constraints leave some out; "
+            f"{_MOST_CHOICES} are the most: list fewer values"
+        )
+    return np.array(list(product(*each)))
 
 
 def _checked(ocp: OCP, i: int, values: ArrayLike) -> list[float]:
@@ -95,6 +108,12 @@ def _refuse(ocp: OCP, index: Sequence[int]) -> None:
                 f"{ocp.name}: a Rate of {rate.control}, which jumps between its levels: leave it "
                 "out; how often it may switch follows from the number of intervals"
             )
+        if not ocp.model.is_discrete:
+            raise UnsupportedProblem(
+                f"{ocp.name}: switched, with a Rate of {rate.control} in continuous time: the "
+                "control is then no constant in an interval; write it as a state whose rate is a "
+                "bounded control"
+            )
     for delay in ocp.delays:
         if ca.depends_on(delay.control, v):
             raise UnsupportedProblem(
@@ -109,8 +128,9 @@ def _refuse(ocp: OCP, index: Sequence[int]) -> None:
             if mixed and getattr(part, "at", "path") != "integral":
                 raise UnsupportedProblem(
                     f"{ocp.name}: the {what} '{part.name}' contains {' or '.join(names)}, which "
-                    "has levels, and something else: between the levels it would say something "
-                    "different; write it for states, or for controls that have none"
+                    "has levels, and is no hard constraint on the way of such controls alone: "
+                    "between the levels it would say something different; write it for states, or "
+                    "for controls that have none"
                 )
 
 

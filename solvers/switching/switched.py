@@ -79,13 +79,17 @@ class SwitchedSolution:
         said = (
             f"{name}: {self.switches} switches on {n} intervals cost {self.evaluation.cost:.7g}. "
         )
+        if not self.relaxed.status.is_success:
+            why = f"{self.relaxed.status.value}. {self.relaxed.message}".strip()
+            return (
+                f"{said}How good they are is not known, the relaxed problem was not solved: {why}"
+            )
         if self.upper == np.inf:
             said += (
                 f"They violate {self.evaluation.worst}: what the relaxed problem meets a switching "
                 "meets only nearly; take more intervals, or a soft constraint. "
             )
-        if self.lower > -np.inf:
-            said += f"No switching on this grid costs less than {self.lower:.7g}. "
+        said += f"No switching on this grid costs less than {self.lower:.7g}. "
         return said + f"The integrals differ by {self.deviation:.3g} s, at most {self.bound:.3g} s."
 
 
@@ -112,7 +116,8 @@ def switched(
 
     Raises:
         ProblemError: naming the control and what is wrong with its values.
-        UnsupportedProblem: naming a term that mixes levels with something else.
+        UnsupportedProblem: naming a term that mixes levels with something else, or a ``Rate`` in
+            continuous time.
     """
     check_instance(ocp, OCP, "switched: the problem")
     check_instance(solver, MultipleShooting, f"{ocp.name}: the solver of a switched problem")

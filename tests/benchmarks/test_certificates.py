@@ -14,7 +14,6 @@ ENTRIES = committed().entries
 # by two families of points; polishing the estimations takes minutes.
 UNCERTIFIED = {
     "alpha-pinene",
-    "bioreactor",
     "hiv",
     "marine-population",
     "methanol",

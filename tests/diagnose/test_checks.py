@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.mistakes import problems as of
+from models.shapes import Cuboid, Sphere, distance
 from ocp import OCP, Box, Constraint, FreeTime, Guess, Model, Signal
 from ocp.problem.run_data import RunData
 from solvers import MultipleShooting, diagnose
@@ -290,6 +291,17 @@ def test_scaling_says_what_to_divide_by():
     found = only(scaling, ocp)
     assert found.where[0] == "altitude"
     assert "divide altitude by 1e+07" in found.sentence
+
+
+def test_what_a_choice_of_features_leaves_in_derivatives_is_no_size():
+    """The curvature of this distance above a face is 0: what is left of the choice is not."""
+    box, ball = Cuboid((10.0, 10.0, 1.0)), Sphere(0.1)
+
+    def cost(s):
+        place = ca.vertcat(s.position, s.velocity, 2.0)
+        return s.force**2 + (distance(ball.at(place), box) - 1.0) ** 2
+
+    assert not list(scaling(subject(of.cart(running_cost=cost, constraints=()))))
 
 
 def in_units_of(size: float) -> OCP:

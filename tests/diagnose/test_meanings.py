@@ -87,6 +87,9 @@ def test_what_data_determine_is_no_finding():
         ([0, 1, 2, 3, 4, 5, 6, 700], True),
         ([0, 1, np.nan, 3, 4, 5, 6, 7], False),
         ([0, 1, 900], False),  # too few to say
+        (1e3 * np.exp(-np.arange(9.0)), False),
+        (1e3 * np.exp(-2.0 * np.arange(9.0))[::-1], False),
+        ([1e5, *np.exp(-np.arange(8.0))], True),
     ],
 )
 def test_outliers(values, named):

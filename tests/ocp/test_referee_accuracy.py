@@ -228,3 +228,10 @@ def test_gaps_count_with_what_they_are_worth() -> None:
     # The displaced node opens two gaps: the end before it misses it, and it misses the next.
     worth = 5.0 * 1e-6 * abs(exp(33.0 / 200) - 1.0)
     assert verdict.cost_error == pytest.approx(worth, rel=0.05)
+
+
+def test_whole_numbers_are_controls_too() -> None:
+    """A switching, say, may come as an array of ints."""
+    ocp, u = problem(-X + U, X**2 + U**2), np.array([[1], [0], [1]])
+    found = trajectory(ocp, u)
+    assert evaluate(found.with_(u=u)).stationarity == evaluate(found).stationarity

@@ -31,6 +31,7 @@ from ocp.phases.phases_guess import guess_of_all
 from ocp.phases.side_by_side import side_by_side
 from ocp.problem.run_data import RunData
 from solvers import Collocation, IndirectShooting, MultipleShooting, certify, multistart, polish
+from solvers.multistart import _guesses
 from tests.phases.problems import BALL, BOUNCE, FALL, GRAVITY, RISE, H, T, U, V, hop, phase
 
 FOUND = solve(hop(), Collocation(6)).or_raise()
@@ -175,3 +176,9 @@ def test_phases_that_are_alike_have_no_unique_solution():
     assert polished.status is not Status.SOLVED
     assert "not unique" in polished.message
     assert "alike" not in FOUND.message
+
+
+def test_each_phase_has_random_starts_of_its_own() -> None:
+    """With one seed for all, the controls of phases alike would be the same."""
+    ((first, second),) = _guesses(hop(), 1, 3, 1.0)
+    assert not np.allclose(first.u, second.u)

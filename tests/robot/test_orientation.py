@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from models.robot import rotation_error
 from models.robot.orientation import angle_over_sine
+from ocp import ProblemError
 from tests.tolerances import DERIVATIVE, ROUNDING, STEP
 
 ANGLES = (0.0, 1e-12, 1e-8, 1e-4, 0.1, 0.19, 0.21, 0.5, 1.5, 3.0)
@@ -73,3 +74,8 @@ def test_series_and_closed_form_meet() -> None:
 def test_at_half_a_turn_there_is_no_number() -> None:
     half = np.diag([-1.0, -1.0, 1.0])
     assert not np.isfinite(error_between(np.eye(3), half)).all()
+
+
+def test_matrices_of_another_shape_are_named() -> None:
+    with pytest.raises(ProblemError, match=r"desired has shape \(2, 2\), \(3, 3\) is needed"):
+        rotation_error(np.eye(2), ca.SX.eye(3))

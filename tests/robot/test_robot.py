@@ -39,7 +39,6 @@ def test_what_it_consists_of(tree: Robot) -> None:
     assert len(tree.tree.bodies) == 6
     assert tree.limits.lower.tolist() == [-0.5, -np.inf, -1.0, 0.0]
     assert tree.limits.effort.tolist() == [300.0, 40.0, 30.0, 20.0]
-    assert tree.tree.masses["lift"] == pytest.approx(6 + 2 + 0.7 + 1.5 + 0.9 + 0.2 + 0.15)
 
 
 def test_the_jacobian_is_the_rate_of_the_pose(tree: Robot) -> None:
@@ -105,6 +104,22 @@ def test_friction_and_armature_are_added() -> None:
     np.testing.assert_allclose(extra, expected, atol=ROUNDING)
     added = array(loaded.mass_matrix(q)) - array(robot_of("tree").mass_matrix(q))
     np.testing.assert_allclose(added, np.diag(rotors), atol=ROUNDING)
+
+
+def test_a_joint_that_mimics_brakes_the_one_that_it_follows() -> None:
+    """Twice as fast, and with twice the lever: 1 + 2 (10 * 2 + 3)."""
+    inertial = """<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0"
+        izz="1"/></inertial>"""
+    joint = (
+        """<joint name="{0}" type="continuous"><parent link="a"/><child link="{1}"/>{2}</joint>"""
+    )
+    leads = joint.format("leads", "b", '<dynamics damping="1"/>')
+    follows = '<dynamics damping="10" friction="3"/><mimic joint="leads" multiplier="2"/>'
+    robot = Robot.from_urdf(
+        f"""<robot name="geared"><link name="a"/><link name="b">{inertial}</link>
+        <link name="c">{inertial}</link>{leads}{joint.format("follows", "c", follows)}</robot>"""
+    )
+    assert float(robot.inverse_dynamics([0.0], [1.0], [0.0])) == pytest.approx(47.0)
 
 
 def test_regrouped_masses_move_no_torque(tree: Robot) -> None:
@@ -232,6 +247,9 @@ def test_a_frame_that_is_not_there_is_named() -> None:
         panda().pose(np.zeros(7), "panda_tcp")
     with pytest.raises(ProblemError, match="has no frame 'cup'"):
         panda().carrying(Payload("cup", 1.0))
+    names: Any = ["panda_link8"]
+    with pytest.raises(ProblemError, match=r"has no frame \['panda_link8'\]; its"):
+        panda().pose(np.zeros(7), names)
 
 
 def test_coordinates_of_another_size_are_refused(tree: Robot) -> None:
@@ -241,6 +259,12 @@ def test_coordinates_of_another_size_are_refused(tree: Robot) -> None:
         tree.mass_matrix(ca.SX.sym("q", 3))
     with pytest.raises(ProblemError, match="finite"):
         tree.mass_matrix([0.0, np.nan, 0.0, 0.0])
+    both: Any = ca.SX.sym("q", 4), ca.MX.sym("v", 4), np.zeros(4)
+    with pytest.raises(ProblemError, match="tree: inverse dynamics: coordinates are SX and MX"):
+        tree.inverse_dynamics(*both)
+    loaded = tree.carrying(Payload("left", ca.SX.sym("mass")))
+    with pytest.raises(ProblemError, match="coordinates are MX, and the payload has symbols"):
+        loaded.mass_matrix(ca.MX.sym("q", 4))
 
 
 def test_what_no_mass_resists_has_kinematics_only() -> None:
@@ -248,10 +272,31 @@ def test_what_no_mass_resists_has_kinematics_only() -> None:
         <joint name="turn" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
     robot = Robot.from_urdf(text)
     assert array(robot.position([0.3], "b")).tolist() == [0.0, 0.0, 0.0]
-    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and neither it nor"):
+    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and no inertia"):
         robot.inverse_dynamics([0.0], [0.0], [0.0])
     assert float(replace(robot, armature=2.0).mass_matrix([0.0])) == 2.0
     robot.carrying(Payload("b", 1.0, (0.0, 1.0, 0.0))).mass_matrix([0.0])
+
+
+def test_a_mass_on_the_axis_resists_nothing() -> None:
+    text = """<robot name="thin"><link name="a"/>
+        <link name="b"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>
+          <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+        <joint name="turn" type="continuous"><origin rpy="0.3 0.2 0.1"/><parent link="a"/>
+          <child link="b"/></joint></robot>"""
+    robot = Robot.from_urdf(text)
+    with pytest.raises(ProblemError, match="joint 'turn' moves link 'b', and no inertia resists"):
+        robot.forward_dynamics([0.0], [0.0], [1.0])
+    replace(robot, armature=0.1).forward_dynamics([0.0], [0.0], [1.0])
+
+
+def test_a_heavy_follower_resists_for_the_one_that_it_follows() -> None:
+    text = """<robot name="geared"><link name="a"/><link name="b"/><link name="c"><inertial>
+        <mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+        </link><joint name="leads" type="continuous"><parent link="a"/><child link="b"/></joint>
+        <joint name="follows" type="continuous"><parent link="a"/><child link="c"/>
+          <mimic joint="leads" multiplier="2"/></joint></robot>"""
+    assert float(Robot.from_urdf(text).mass_matrix([0.0])) == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
@@ -289,8 +334,10 @@ def test_joints_that_cannot_be_locked_are_named(tree: Robot, joints: dict, messa
     [
         (("left", -1.0), "payload at 'left': mass = -1.0"),
         (("left", 1.0, (0.0, 1.0)), "center has 2 entries"),
-        (("left", 1.0, (0.0, 0.0, 0.0), np.arange(9.0)), "tensor is not symmetric"),
+        (("left", 1.0, (0.0, 0.0, 0.0), np.arange(9.0).reshape(3, 3)), "tensor is not symmetric"),
         (("left", ca.SX.sym("m", 2)), "its mass has 2 entries"),
+        (("left", 1.0, (0.0, 0.0, 0.0), 0.1), r"tensor has shape \(\), \(3, 3\) is needed"),
+        (("left", 1.0, (0.0, 0.0, 0.0), -np.eye(3)), "principal moment of inertia is -1 kg m"),
     ],
 )
 def test_wrong_payloads_are_refused(arguments: tuple, message: str) -> None:

@@ -17,7 +17,8 @@ from models.robot import (
     panda,
     rotation_error,
 )
-from ocp import OCP, ProblemError, evaluate, solve
+from models.robot_path import _reach
+from ocp import OCP, Box, ProblemError, evaluate, solve
 from solvers import Collocation, MultipleShooting, PrioritisedKinematics, Schuetz, polish, track
 from tests.tolerances import CERTIFIED, DERIVATIVE, RESIDUAL, ROUNDING, STEP
 
@@ -240,14 +241,24 @@ def test_instantaneous_control_takes_the_same_error() -> None:
         (
             lambda p, r: PositionTask("tip", p, directions=[1.0, 0.0, 0.0]),
             {},
-            r"directions have shape \(3,\), \(m, 3\)",
+            r"directions has shape \(3,\), \(m, 3\)",
         ),
         (
             lambda p, r: PositionTask("tip", p, directions=[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
             {},
             "directions depend on each other",
         ),
-        (lambda p, r: OrientationTask("tip", 2 * r), {}, "rotation is no rotation"),
+        (
+            lambda p, r: PositionTask("tip", p, directions=np.zeros((0, 3))),
+            {},
+            "it is empty",
+        ),
+        (
+            lambda p, r: PositionTask("tip", p, directions=[[1.0, 0.0], [1.0]]),
+            {},
+            "directions has rows of different lengths",
+        ),
+        (lambda p, r: OrientationTask("tip", 2 * r), {}, "rotation is not orthonormal"),
         (
             lambda p, r: PositionTask(**{"frame": 3, "path": p}),
             {},
@@ -284,8 +295,57 @@ def test_an_orientation_half_a_turn_away_is_named(robot: Robot) -> None:
         redundancy_ocp(robot, OrientationTask(HAND, rotation), theta0=REST, horizon=1.0)
 
 
+def test_the_limits_of_a_robot_are_those_of_its_problem(robot: Robot) -> None:
+    task, limits = PositionTask(HAND, here(robot, REST, HAND)[0]), robot.limits
+    ocp = redundancy_ocp(robot, task, theta0=REST, horizon=1.0, form="velocity")
+    assert ocp.model.x_names == robot.joints
+    np.testing.assert_array_equal(np.asarray(ocp.state_bounds.lower), limits.lower)
+    np.testing.assert_array_equal(np.asarray(ocp.control_bounds.upper), limits.velocity)
+    (fast,) = redundancy_ocp(robot, task, theta0=REST, horizon=1.0).constraints
+    np.testing.assert_array_equal(np.asarray(fast.lower), -limits.velocity)
+    free: dict[str, Any] = {"joint_bounds": Box(), "velocity_bounds": Box()}
+    bare = redundancy_ocp(robot, task, theta0=REST, horizon=1.0, **free)
+    assert not bare.constraints
+    assert not bare.state_bounds.is_active
+
+
+def test_an_orientation_may_turn_by_half_a_turn_on_the_way(robot: Robot) -> None:
+    rotation = here(robot, REST, HAND)[1]
+
+    def around(t: ca.SX) -> ca.SX:
+        c, s = ca.cos(np.pi * t), ca.sin(np.pi * t)
+        about_z = ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+        return ca.mtimes(ca.SX(rotation), about_z)
+
+    ocp = redundancy_ocp(robot, OrientationTask(HAND, around), theta0=REST, horizon=2.0)
+    assert ocp.model.nx == robot.n
+
+
+def test_a_path_that_breaks_on_the_way_is_named(robot: Robot) -> None:
+    start = ca.DM(here(robot, REST, HAND)[0])
+    broken = PositionTask(HAND, lambda t: start + ca.vertcat(0, 0, 1 - ca.sqrt(1 - t)) / 100)
+    with pytest.raises(ProblemError, match="the task is not finite at t = 1"):
+        redundancy_ocp(robot, broken, theta0=REST, horizon=2.0)
+
+
 def test_a_planar_arm_takes_no_task_in_space() -> None:
     with pytest.raises(ProblemError, match="a PositionTask is for a Robot, the arm is planar"):
         redundancy_ocp(
             PlanarArm((1.0, 1.0, 1.0)), PositionTask("tip", [1, 1, 1]), theta0=[0, 1, 1], horizon=1
         )
+
+
+def test_a_joint_that_slides_reaches_as_far_as_it_may() -> None:
+    """Links of 1 m and 0.5 m with a slide of at most 0.7 m between them: 2.2 m."""
+    text = """<robot name="slider"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+        <link name="tip"/>
+        <joint name="yaw" type="continuous"><parent link="a"/><child link="b"/>
+          <axis xyz="0 0 1"/></joint>
+        <joint name="out" type="prismatic"><origin xyz="1 0 0"/><parent link="b"/><child link="c"/>
+          <axis xyz="1 0 0"/><limit lower="-0.2" upper="0.7" velocity="1" effort="1"/></joint>
+        <joint name="turn" type="continuous"><parent link="c"/><child link="d"/>
+          <axis xyz="0 0 1"/></joint>
+        <joint name="end" type="fixed"><origin xyz="0.5 0 0"/><parent link="d"/>
+          <child link="tip"/></joint></robot>"""
+    robot = Robot.from_urdf(text)
+    assert _reach(robot, "tip")[1] == pytest.approx(2.2)

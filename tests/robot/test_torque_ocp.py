@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from models.robot import Payload, Robot, panda, read_urdf, torque_ocp
-from ocp import OCP, Parameter, ProblemError, Solution, Solver, evaluate, solve
+from ocp import OCP, Guess, Parameter, ProblemError, Signal, Solution, Solver, evaluate, solve
 from solvers import Collocation, MultipleShooting
 from tests.tolerances import ORDER, SAME_PROGRAM
 
@@ -224,6 +224,18 @@ def test_the_panda_moves_from_the_default_guess_by_every_backend() -> None:
             {"robot": arm().carrying(Payload("lower", ca.SX.sym("load")))},
             "parameters: in the robot, 'load' is a symbol without a value",
         ),
+        (
+            {"parameters": Parameter("load", ca.SX.sym("load"), 1.0)},
+            "parameters is a Parameter, tuple or list",
+        ),
+        (
+            {"robot": arm().locked({"shoulder": 0.0, "elbow": 0.0}), "start": [], "goal": []},
+            "arm has no joint that moves",
+        ),
+        (
+            {"form": "torque", "steps": None, "acceleration_weight": 1e-3},
+            "knows no acceleration",
+        ),
     ],
 )
 def test_wrong_input_is_named(options: dict[str, Any], message: str) -> None:
@@ -236,3 +248,36 @@ def test_wrong_input_is_named(options: dict[str, Any], message: str) -> None:
     }
     with pytest.raises(ProblemError, match=message):
         torque_ocp(**(given | options))
+
+
+def test_both_ends_of_a_step_are_paid_for_alike() -> None:
+    """Half a step each; accelerations, the same at both, in full."""
+    problem = motion(torque_at="ends", acceleration_weight=0.5)
+    model = problem.model
+    cost = ca.Function("cost", [model.x, model.u], [problem.running_cost])
+    a, first, last = np.array([1.0, 2.0]), np.array([3.0, -1.0]), np.array([0.5, 4.0])
+    paid = (first @ first + last @ last) / (2.0 * EFFORT**2) + 0.5 * a @ a
+    found = float(cost(np.zeros(4), [*a, *first, *last]))
+    assert found == pytest.approx(TIME / STEPS * paid)
+
+
+def test_controls_have_the_units_of_their_joints() -> None:
+    accelerations, torques = ["rad/s^2"] * 2, ["N m"] * 2
+    assert list(motion().model.u_units) == [*accelerations, *torques]
+    assert list(motion(torque_at="ends").model.u_units) == [*accelerations, *torques * 2]
+
+
+def test_a_payload_that_is_a_signal_has_its_first_value_in_the_guess() -> None:
+    mass, samples = ca.SX.sym("mass"), np.linspace(0.5, 3.0, STEPS + 1)[:, None]
+    loaded = arm(effort=STRONG).carrying(Payload("lower", mass))
+    known = arm(effort=STRONG).carrying(Payload("lower", 0.5))
+    signal = motion(loaded, parameters=[Signal("mass", mass, samples)])
+    guess, expected = signal.guess, motion(known).guess
+    assert isinstance(guess, Guess)
+    assert isinstance(expected, Guess)
+    np.testing.assert_allclose(np.asarray(guess.u), np.asarray(expected.u))
+
+
+def test_the_form_in_torques_has_usable_defaults() -> None:
+    problem = torque_ocp(arm(), START, GOAL, horizon=1.0, form="torque")
+    assert problem.model.nu == 2

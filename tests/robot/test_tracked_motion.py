@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -45,6 +46,14 @@ def test_a_load_that_the_controller_does_not_know_leaves_an_error(plan: Solution
     assert known.wanted.max() > EFFORT
 
 
+def test_what_is_beyond_the_limits_is_not_given(plan: Solution) -> None:
+    """A weak robot asks for as much, is given less, and falls behind."""
+    weak = arm(effort=EFFORT / 4.0)
+    found = tracked_motion(weak, plan)
+    assert found.share.max() > 1.0
+    assert np.abs(found.error).max() > 10 * np.abs(tracked_motion(arm(), plan).error).max()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -53,6 +62,11 @@ def test_a_load_that_the_controller_does_not_know_leaves_an_error(plan: Solution
         ({"robot": 3}, "robot is an int"),
         ({"plant": 3}, "plant is an int"),
         ({"solution": 3}, "solution is an int"),
+        (
+            {"plant": arm().carrying(Payload("lower", ca.SX.sym("mass")))},
+            "tracked motion: plant: mass of its payload is a symbol",
+        ),
+        ({"robot": arm(effort=0.0)}, "effort: the limit of joint '.*' is 0"),
     ],
 )
 def test_wrong_input_is_named(plan: Solution, change: dict[str, Any], message: str) -> None:

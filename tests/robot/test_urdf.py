@@ -1,6 +1,7 @@
 """What a URDF says, and every way in which it can be wrong."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,9 +66,37 @@ def test_a_byte_order_mark_is_passed_over() -> None:
     assert read_urdf("\ufeff" + TREE).name == "tree"
 
 
+def test_files_in_their_own_encoding_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "tree.urdf"
+    text = TREE.replace('"tree"', '"Bäumchen"', 1)
+    for encoding in ("utf-16", "iso-8859-1", "utf-8-sig"):
+        declared = text.replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"')
+        file.write_bytes(declared.encode(encoding))
+        assert read_urdf(file).name == "Bäumchen"
+    assert read_urdf(text.replace('"utf-8"', '"iso-8859-1"')).name == "Bäumchen"
+
+
+@pytest.mark.parametrize(
+    "content", [b'<robot name="\xff"/>', b'<?xml version="1.0" encoding="x"?>']
+)
+def test_files_that_cannot_be_decoded_are_named(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "odd.urdf"
+    file.write_bytes(content)
+    with pytest.raises(ProblemError, match="this is no XML"):
+        read_urdf(file)
+
+
 def test_prefixes_that_nobody_declared_are_passed_over() -> None:
     text = HEAD + AB + BC + "<drake:diagram xyz:id='1'/></robot>"
     assert Robot.from_urdf(text).n == 2
+
+
+def test_a_file_that_is_no_text_is_named() -> None:
+    nothing: Any = None
+    with pytest.raises(ProblemError, match="resolve_file: file is"):
+        resolve_file(nothing, {})
+    with pytest.raises(ProblemError, match="resolve_file: packages is"):
+        resolve_file("package://a/b", nothing)
 
 
 def test_files_of_packages_are_resolved() -> None:

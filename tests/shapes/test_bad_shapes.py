@@ -49,13 +49,15 @@ FLAT = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.2, 0]]
         (lambda: Cuboid([1, 1, 1], -0.1), "Cuboid: radius = -0.1"),
         (lambda: HalfSpace([0, 0, 0]), "HalfSpace: normal has length zero"),
         (lambda: HalfSpace([0, 0, 1], np.nan), "HalfSpace: offset"),
-        (lambda: ConvexHull([]), r"vertices have shape \(0,\)"),
+        (lambda: ConvexHull([]), r"vertices has shape \(0,\)"),
         (lambda: ConvexHull(np.zeros((0, 3))), r"\(it is empty\)"),
         (lambda: ConvexHull(CORNERS[:3]), "are 3, at least 4 are needed"),
         (lambda: ConvexHull(FLAT), "lie in one plane"),
         (lambda: ConvexHull([[0, 0, 0]] * 5), "lie in one plane"),
         (lambda: ConvexHull(np.where(CORNERS > 0, np.nan, 0.0)), "is nan"),
         (lambda: ConvexHull("body"), r"shape \(\)"),
+        (lambda: ConvexHull([[0, 0, 0], [1, 0]]), "vertices has rows of different lengths"),
+        (lambda: Pose([[1, 0, 0], [0, 1]]), "rotation has rows of different lengths"),
         (lambda: ConvexHull([*CORNERS, [0.1, 0.1, 0.1]]), r"vertices\[4\] is no corner"),
         (lambda: ConvexHull(CORNERS, -0.1), "ConvexHull: radius = -0.1"),
         (lambda: Pose(1.001 * np.eye(3)), "not orthonormal: R'R differs .* by 0.002"),
@@ -119,3 +121,13 @@ def problem(**changed: Any) -> Any:
 def test_problems(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(ProblemError, match=message):
         problem(**changed)
+
+
+def test_a_long_normal_is_one() -> None:
+    np.testing.assert_allclose(np.asarray(HalfSpace([0, 0, 1e200]).normal), [0, 0, 1])
+
+
+def test_a_list_may_hold_symbols() -> None:
+    x = ca.SX.sym("x")
+    gap = ca.Function("gap", [x], [distance(Sphere(0.1).at([x, 0, 0]), Sphere(0.2))])
+    np.testing.assert_allclose(float(gap(2.0)), 1.7)

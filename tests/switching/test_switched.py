@@ -13,6 +13,7 @@ from ocp import (
     Box,
     Constraint,
     Delay,
+    Grid,
     Guess,
     Model,
     Parameter,
@@ -22,9 +23,10 @@ from ocp import (
     UnsupportedProblem,
     evaluate,
 )
+from ocp.internal import Steps
 from solvers import Collocation, MultipleShooting, switched
 from solvers.switching.convexified import Convexified
-from solvers.switching.modes import Modes
+from solvers.switching.modes import Modes, _choices
 from solvers.switching.sum_up_rounding import deviation, sum_up_rounding
 
 PREY, PREDATOR, FISHING = (ca.SX.sym(n) for n in ("prey", "predator", "fishing"))
@@ -248,6 +250,33 @@ def test_terms_without_a_meaning_between_levels(changes, said):
         switched(fishing(**changes), {"fishing": (0, 1)}, MultipleShooting(5))
 
 
+def test_a_rate_is_one_of_steps():
+    """In continuous time the control is no constant in an interval; in steps it is."""
+    rate = {"rates": (Rate(PUSH, -5.0, 5.0),)}
+    with pytest.raises(UnsupportedProblem, match="with a Rate of push in continuous time"):
+        switched(geared(**rate), {"gear": (1, 2)}, MultipleShooting(20))
+
+
+def test_an_unsolved_relaxed_problem_is_said():
+    """No fishing brings back a lake that is to have 50 times its fish at once."""
+    full = Constraint("full", PREY, lower=50.0, at="terminal")
+    found = switched(fishing(constraints=(full,)), {"fishing": (0, 1)}, MultipleShooting(5))
+    said = str(found)
+    why = found.relaxed.status.value
+    assert f"is not known, the relaxed problem was not solved: {why}" in said
+    assert "only nearly" not in said
+
+
+def test_choices_are_counted_before_they_are_made():
+    with pytest.raises(UnsupportedProblem, match=f"{2**40} choices of levels, before"):
+        _choices(fishing(), [[0.0, 1.0]] * 40)
+
+
+def test_steps_have_a_value_for_each_part():
+    with pytest.raises(ProblemError, match="steps 'levels': 3 values, 2 are needed"):
+        Steps("levels", FISHING, np.array([0.5]), np.zeros((3, 1)))
+
+
 def test_other_refusals():
     late = sampled(delays=(Delay(FISHING, 2),))
     with pytest.raises(UnsupportedProblem, match="a Delay of fishing"):
@@ -270,3 +299,10 @@ def test_a_parameter_of_the_name_is_no_trouble():
     lake = fishing(parameters=(Parameter("levels", scale, 1.0),), terminal_cost=scale)
     found = switched(lake, {"fishing": (0, 1)}, MultipleShooting(20))
     assert found.solution.parameters["levels"] == 1.0
+
+
+def test_the_bound_is_that_of_the_widest_interval():
+    grid = Grid((0.0, 0.1, 0.5, 0.6, 1.0))
+    found = switched(fishing(), {"fishing": (0, 1)}, MultipleShooting(grid))
+    assert found.bound == pytest.approx(12.0 * 0.4)
+    assert found.deviation <= found.bound

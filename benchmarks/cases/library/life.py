@@ -1,8 +1,8 @@
-"""Medicine and ponds."""
+"""Medicine, and prey."""
 
 from benchmarks.cases.case import Published
-from benchmarks.cases.library.entry import BONNANS, DIRECT, certified, computed, entry
-from models.textbook import bioreactor, predator_and_prey, tuberculosis, tumour
+from benchmarks.cases.library.entry import DIRECT, certified, computed, entry
+from models.textbook import predator_and_prey, tuberculosis, tumour
 
 LIFE = (
     entry(
@@ -29,15 +29,5 @@ LIFE = (
         DIRECT,
         "smooth",
         "[Betts 2010, section 6.16]",
-    ),
-    entry(
-        bioreactor,
-        "bioreactor",
-        computed(-0.61413472, 2e-7, "collocation on Radau and on Gauss points"),
-        # Where the light begins its second derivative jumps: refined meshes end INACCURATE.
-        ("direct",),
-        "bang-bang",
-        BONNANS,
-        published=(Published(-0.614134, BONNANS),),
     ),
 )

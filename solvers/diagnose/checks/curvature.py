@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ocp.internal import without_traces
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.checks.influence import feeding
 from solvers.diagnose.finding import Finding, Severity
@@ -101,7 +102,7 @@ def _concave_control(subject: DiagnosedProblem) -> Iterator[Finding]:
         return
     hessian = ca.hessian(ca.SX(ocp.running_cost), m.u)[0]
     points = subject.along + subject.around
-    values = points.evaluate(ocp, hessian).reshape(-1, m.nu, m.nu)
+    values = without_traces(points.evaluate(ocp, hessian)).reshape(-1, m.nu, m.nu)
     values = values[np.isfinite(values).all(axis=(1, 2))]
     if not len(values) or not np.abs(values).max() > 0.0:
         return
@@ -128,7 +129,7 @@ def _concave_state(subject: DiagnosedProblem) -> Iterator[Finding]:
     for what, cost in (("running", ocp.running_cost), ("terminal", ocp.terminal_cost)):
         gradient = ca.gradient(ca.SX(cost), m.x)
         diagonal = ca.vertcat(*[ca.jacobian(gradient[i], m.x[i]) for i in range(m.nx)])
-        values = points.evaluate(ocp, diagonal)
+        values = without_traces(points.evaluate(ocp, diagonal))
         values = values[np.isfinite(values).all(axis=1)]
         scale = np.abs(values).max(initial=0.0)
         if not scale > 0.0:

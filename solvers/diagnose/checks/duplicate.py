@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ocp import Constraint
+from ocp.internal import without_traces
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.finding import Finding, Severity
 from solvers.diagnose.subject import DiagnosedProblem, SamplePoints
@@ -47,7 +48,9 @@ def _dependent(
     points: SamplePoints,
 ) -> Iterator[Finding]:
     slope = ca.jacobian(ca.vertcat(*[row for _, row in rows]), unknowns)
-    values = points.evaluate(subject.ocp, slope).reshape(-1, unknowns.numel(), len(rows))
+    values = without_traces(points.evaluate(subject.ocp, slope)).reshape(
+        -1, unknowns.numel(), len(rows)
+    )
     values = values[np.isfinite(values).all(axis=(1, 2))]
     if not len(values):
         return

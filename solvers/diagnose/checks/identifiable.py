@@ -113,14 +113,15 @@ def _slopes_of_data(subject: DiagnosedProblem, where: list[int], seed: int) -> n
 def _finding(subject: DiagnosedProblem, where: list[int], what: str) -> Finding:
     names = tuple(subject.ocp.model.x_names[i] for i in where)
     said = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-    alone = "it" if len(names) == 1 else "them together, in one direction,"
-    more = "measure what it moves" if len(names) == 1 else "put one name in their place"
+    alone = len(names) == 1
+    when = f"{said} changes" if alone else f"{said} change together, in one direction"
+    left, one = ("it", "it") if alone else ("this direction", "one of them")
+    more = "measure what it moves" if alone else "put one name in their place"
     return Finding(
         Cause.UNIDENTIFIABLE,
         Severity.WARNING,
         names,
-        f"No {what} changes when {said} changes: a move of {alone} has no effect, so the optimiser "
-        f"leaves where the guess was what it cannot know. Fix one of them as a number, {more}, or "
-        "add a cost on what is known of it beforehand.",
+        f"No {what} changes when {when}: the optimiser leaves {left} where the guess was. Fix "
+        f"{one} as a number, {more}, or add a cost on what is known beforehand.",
         float(len(names)),
     )

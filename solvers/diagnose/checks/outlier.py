@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ocp import Measurement
 from solvers.diagnose.cause import Cause
@@ -27,7 +28,8 @@ def outlier(subject: DiagnosedProblem) -> Iterator[Finding]:
 def _furthest(measured: Measurement, row: int) -> int | None:
     """Return which value of a row lies far from all others; None: none does.
 
-    A step, whose neighbours disagree as much, is none.
+    A step, whose neighbours disagree as much, is none; nor is the end of a steep decay, where the
+    line through the next two is about as far from the one after the end.
     """
     known = np.flatnonzero(np.isfinite(np.asarray(measured.values)[:, row]))
     if len(known) < _FEW:
@@ -37,12 +39,23 @@ def _furthest(measured: Measurement, row: int) -> int | None:
     before = np.clip(np.arange(len(y)) - 1, 0, None)
     after = np.clip(np.arange(len(y)) + 1, None, len(y) - 1)
     before[0], after[-1] = 2, len(y) - 3
-    slope = (y[after] - y[before]) / (t[after] - t[before])
-    distance = np.abs(y - y[before] - slope * (t - t[before]))
+    distance = _from_line(t, y, np.arange(len(y)), before, after)
     worst = int(distance.argmax())
     usual = max(float(np.median(distance)), float(sigma[worst]))
+    if worst in (0, len(y) - 1):
+        next_to_it = np.array([1, 2, 3]) if worst == 0 else len(y) - np.array([2, 3, 4])
+        usual = max(usual, float(_from_line(t, y, *next_to_it)))
     apart = abs(y[after[worst]] - y[before[worst]])
     return int(known[worst]) if distance[worst] > max(_FAR * usual, apart) else None
+
+
+def _from_line(
+    t: np.ndarray, y: np.ndarray, at: ArrayLike, one: ArrayLike, other: ArrayLike
+) -> np.ndarray:
+    """Return how far values are from the line through two others."""
+    k, i, j = (np.asarray(index) for index in (at, one, other))
+    slope = (y[j] - y[i]) / (t[j] - t[i])
+    return np.abs(y[k] - y[i] - slope * (t[k] - t[i]))
 
 
 def _finding(subject: DiagnosedProblem, measured: Measurement, row: int, k: int) -> Finding:

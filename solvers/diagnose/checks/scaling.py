@@ -6,6 +6,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from ocp.internal import without_traces
 from solvers.diagnose.cause import Cause
 from solvers.diagnose.conditioning import Conditioning, conditioning
 from solvers.diagnose.finding import Finding, Severity
@@ -100,7 +101,7 @@ def _weights(
     gradient = ca.gradient(ca.SX(ocp.running_cost), z)
     diagonal = ca.vertcat(*[ca.jacobian(gradient[i], z[i]) for i in range(z.numel())])
     points = subject.tried if subject.trial.status.is_success else subject.along
-    values = points.evaluate(ocp, diagonal)
+    values = without_traces(points.evaluate(ocp, diagonal))
     values = np.abs(values[np.isfinite(values).all(axis=1)]).max(axis=0, initial=0.0) * sizes**2
     there = np.flatnonzero(values > 0.0)
     if not there.size:
