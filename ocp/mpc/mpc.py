@@ -271,8 +271,8 @@ class MPC:
 
         That step then only corrects this plan by what was measured: one real-time iteration, which
         differs from a solve by second-order terms in the distance of the two states. The ladder
-        judges it like any plan that is not optimal: the model is run under its controls. Where it
-        is not good enough, the step comes at another time or with other parameters, or nothing was
+        judges it like any plan that is not optimal: the model is run under its controls, and its
+        states must be those of the plan to 2 %. Where it is not good enough, the step comes at another time or with other parameters, or nothing was
         prepared, the step solves as always. A rollout (``run``, ``closed_loop``) calls it after
         every step; who calls ``step`` calls it when the input has been sent.
 

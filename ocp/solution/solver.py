@@ -105,8 +105,9 @@ class FeedbackProgram(Program):
         """Correct the answer that was prepared for another start, once.
 
         Returns:
-            a solution with the status ``ITERATION_LIMIT``; None where nothing was prepared for this
-            time and these parameters, or the corrected problem has no solution.
+            a solution with the status ``ITERATION_LIMIT``, with cost and residual of the problem
+            itself; None where nothing was prepared for this time and these parameters, the
+            corrected problem has no solution, or it is no longer like the problem itself.
         """
 
 

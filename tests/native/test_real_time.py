@@ -14,6 +14,7 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Decision,
     FlightRecorder,
     InputSource,
     Model,
@@ -23,6 +24,7 @@ from ocp import (
     Solution,
     Status,
     UnsupportedProblem,
+    evaluate,
     replay,
 )
 from ocp.internal import ShiftedPlan
@@ -163,6 +165,55 @@ def test_a_push_that_the_correction_does_not_survive_is_solved_for() -> None:
     assert mpc.prepare_next()
     x = pushed.plan.state(2 * DT)
     assert mpc.step(x, 2.3 * DT).source is InputSource.OPTIMAL  # not when it was expected
+
+
+def moved(mpc: MPC, by: list[float]) -> Decision:
+    """Decide from a state that is that far from the one a prepared plan is for."""
+    plan = mpc.step([0.6, 0.2], 0.0).plan
+    assert plan is not None
+    assert mpc.prepare_next()
+    return mpc.step(plan.state(DT) + by, DT)
+
+
+@pytest.fixture(scope="module")
+def free() -> MPC:
+    """A controller of a pendulum without rows that a roll-out could violate."""
+    return controller(pendulum(constraints=()), real_time=True)
+
+
+def test_where_the_model_leaves_the_states_of_a_correction_a_solve_decides(free) -> None:
+    free.reset()
+    assert moved(free, [0.01, 0.02]).source is InputSource.REAL_TIME
+    free.reset()
+    far = moved(free, [2.4, 0.0])
+    assert far.source is InputSource.OPTIMAL
+    assert far.plan is not None
+    assert far.plan.cost == pytest.approx(evaluate(far.plan).cost, rel=1e-3)
+
+
+def test_a_correction_says_the_residual_of_the_problem_itself(free) -> None:
+    residuals = []
+    for size in (0.08, 0.04, 0.02):  # so far that no other bound is active
+        free.reset()
+        decision = moved(free, [-size, size])
+        assert decision.source is InputSource.REAL_TIME
+        assert decision.plan is not None
+        assert decision.plan.cost == pytest.approx(evaluate(decision.plan).cost, rel=1e-3)
+        residuals.append(decision.residual)
+    order = np.log2(np.array(residuals[:-1]) / residuals[1:])
+    np.testing.assert_allclose(order, 2.0, atol=0.3)
+
+
+def test_a_cost_that_is_not_the_quadratic_one_is_no_answer() -> None:
+    ocp = linear()
+    quartic = pendulum(
+        name="quartic", model=ocp.model, constraints=(), running_cost=X[0] ** 4 + 0.05 * U**2
+    )
+    program = built(quartic)
+    base = program.run().or_raise()
+    for x0, is_near in (([0.61, 0.2], True), ([2.6, 0.2], False)):
+        assert program.prepare_feedback(x0=base.x[0], guess=base)
+        assert (program.feedback(x0=x0) is not None) == is_near
 
 
 def test_without_preparation_every_step_solves() -> None:
