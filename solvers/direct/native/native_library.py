@@ -163,7 +163,7 @@ class NativeLibrary:
         self.library.native_freeze(self._block)
 
     def judge(self) -> None:
-        """Let ``report`` say what an answer of the frozen program is worth in the problem itself."""
+        """Let ``report`` say what a frozen program's answer is worth in the problem itself."""
         self.library.native_judge(self._block)
 
     def solve(self, options: NativeOptions) -> int:

@@ -64,12 +64,22 @@ class WarmRun:
                 return self._result(data, report)
         return None if ending is None else WarmStart(None, ending, perf_counter() - started)
 
-    def freeze(self, data: RunData, guess: InitialGuess) -> bool:
-        """Run from a guess, and freeze the program at the answer; return whether there is one."""
+    def freeze(self, data: RunData, guess: InitialGuess, *, is_minimum: bool = False) -> bool:
+        """Run from a guess, and freeze the program at the answer; return whether there is one.
+
+        Args:
+            data: of the run.
+            guess: has states and costates.
+            is_minimum: whether it is known to be one. Where it is not, an answer of which some
+                control did not move may be a saddle, and is none.
+        """
         library = self.solver.library
         if self._ended(data, guess) != _SOLVED:
             return False
-        if not self._is_right(library.account(), library.report()):
+        account = library.account()
+        if not self._is_right(account, library.report()):
+            return False
+        if account.unmoved > 0.0 and not is_minimum:
             return False
         library.freeze()
         return True
