@@ -303,7 +303,10 @@ class MPC:
             ProblemError: if a callback of a step calls the controller.
         """
         if self._inside == get_ident():
-            raise ProblemError(f"MPC of {self.ocp.name}: step or reset is called inside a step")
+            raise ProblemError(
+                f"MPC of {self.ocp.name}: step, reset or prepare_next is called inside a step: "
+                "a callback of a controller cannot call it"
+            )
         # The statement, not its methods: Ctrl-C does not come between lock and block.
         with self._lock:
             self._inside = get_ident()
