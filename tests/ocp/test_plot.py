@@ -339,7 +339,7 @@ def test_a_plane_of_what_is_never_known_together_or_of_too_many_is_refused(coole
         )
         for x in (h, q)
     )
-    found = solve(Phases("both", (up, on), (Link([0.0]),)), Collocation(3))
+    found = solve(Phases("both", (up, on), (Link(ca.SX(0.0)),)), Collocation(3))
     with pytest.raises(ProblemError, match="h and q are never known at the same time"):
         found.plot(plane=("h", "q"))
     with pytest.raises(ProblemError, match="7 solutions in one picture, 6 at most"):
