@@ -11,12 +11,11 @@ from ocp import Compiler, UnsupportedProblem
 from ocp.internal import Unbuildable, built_library
 from solvers.direct.native.library_check import first_difference
 from solvers.direct.native.native_arrays import NativeArrays
-from solvers.direct.native.stage_code import StageCode
+from solvers.direct.native.stage_code import NOTED, StageCode
 
 _LINE = 64  # bytes that memory is aligned to
 _REPORT = 13  # numbers of ``native_report``
 _PAUSED = 6  # of ``Ending``
-_NOTED = 512  # iterations of which something is noted
 #: What is noted of an iteration.
 NOTE = ("cost", "primal", "dual", "product", "barrier", "shift", "length")
 
@@ -217,7 +216,7 @@ class NativeLibrary:
     @cached_property
     def _notes(self) -> tuple[ctypes.c_void_p, np.ndarray]:
         """Where notes are written, and as an array."""
-        notes = np.empty((_NOTED, len(NOTE)))
+        notes = np.empty((NOTED, len(NOTE)))
         return ctypes.c_void_p(notes.ctypes.data), notes
 
     @cached_property
