@@ -87,11 +87,13 @@ from ocp.referee.integrate_controls import segment_gaps
 from ocp.solution.jumps import Jump, jumps_along
 from ocp.solution.piecewise_polynomial import PiecewisePolynomial, bernstein, elevated
 from ocp.solution.shifted_plan import ShiftedPlan
+from ocp.solution.solution import SAME_INSTANT
 from ocp.solution.solver import BuiltProgram
 
 __all__ = [
     "ACCURACY",
     "QUIET",
+    "SAME_INSTANT",
     "AlgebraicControls",
     "BlockingSolver",
     "BufferedFunction",

@@ -36,8 +36,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     Of those marked ``over_library`` the others run in ``make nightly`` only; of those marked
     ``many`` they are slow: ``make quick`` leaves them out, ``make test`` does not. Which ones is
-    always the same. Of several poses of one case another third runs each, since the number of
-    cases is no multiple of three.
+    always the same; what is chosen by name, with ``-k`` or ``::``, runs as a whole. Of several
+    poses of one case another third runs each, since the number of cases is no multiple of three.
     """
     counts, kept, left = Counter[str](), [], []
     for item in items:
@@ -49,6 +49,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.slow)
         is_left = item.get_closest_marker("over_library") and k % _SHARE
         (left if is_left else kept).append(item)
-    if left and not config.getoption("--nightly"):
+    if left and not config.getoption("--nightly") and not _is_asked_for_by_name(config):
         config.hook.pytest_deselected(items=left)
         items[:] = kept
+
+
+def _is_asked_for_by_name(config: pytest.Config) -> bool:
+    """Whether ``-k`` or an argument such as ``test_x.py::test_y`` chooses tests."""
+    return bool(config.option.keyword) or any("::" in given for given in config.args)

@@ -75,6 +75,20 @@ def test_a_picture_above_all_code_is_what_is_called_so_at_its_end() -> None:
     assert shown.file == "top.png"
 
 
+def test_a_picture_is_shown_once() -> None:
+    code = "from matplotlib.figure import Figure\npicture = Figure()"
+    shown = "![one](_static/pages/one.png)\n"
+    page = Page("one", f"```python\n{code}\n```\n\n{shown}\n```python\nx = 1\n```\n\n{shown}")
+    with pytest.raises(TypeError, match=r"one\.png: picture is a NoneType"):
+        list(page.run())
+
+
+def test_a_text_that_no_code_prints_is_refused() -> None:
+    page = Page("one", "```python\nprint(1)\n```\n\n```text\n1\n```\n\nand\n\n```text\n2\n```\n")
+    with pytest.raises(ValueError, match="one, line 11: nothing above this text prints it"):
+        list(page.run())
+
+
 @pytest.mark.parametrize(
     ("said", "printed", "same"),
     [

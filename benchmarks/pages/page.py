@@ -14,10 +14,12 @@ from matplotlib.figure import Figure
 DOCS = Path(__file__).parents[2] / "docs"
 #: Pages whose code runs from the first line to the last.
 WHERE = ("learn/*.md", "gallery/*.md", "pictures.md")
-# A block of code and the text behind it, which is what it prints; or a picture.
+# A block of code and the text behind it, which is what it prints; or a picture; or such a text
+# alone.
 _PART = re.compile(
     r"```python\n(?P<code>.*?)```(?:\s*```text\n(?P<said>.*?)```)?"
-    r"|!\[[^]]*\]\((?:\.\./)?_static/pages/(?P<file>[\w.-]+)\)",
+    r"|!\[[^]]*\]\((?:\.\./)?_static/pages/(?P<file>[\w.-]+)\)"
+    r"|(?P<alone>```text\n)",
     re.DOTALL,
 )
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
@@ -86,19 +88,24 @@ class Page:
         """Run the code in the current folder, as one program; yield what it prints and draws.
 
         A picture above all code is what ``picture`` is at the end of the page.
+        What is called so below is forgotten when it was shown.
 
         Raises:
             TypeError: if ``picture`` is no figure where one is shown.
+            ValueError: if a block of text does not stand directly below a block of code.
         """
         names: dict[str, Any] = {"__name__": self.name}
         on_top = []
         has_run = False
         for part in _PART.finditer(self.text):
+            if part["alone"]:
+                line = self.text.count("\n", 0, part.start()) + 1
+                raise ValueError(f"{self.name}, line {line}: nothing above this text prints it")
             if part["file"] and not has_run:
                 on_top.append(part["file"])
                 continue
             if part["file"]:
-                yield _shown(part["file"], names.get("picture"))
+                yield _shown(part["file"], names.pop("picture", None))
                 continue
             has_run = True
             printed = StringIO()

@@ -4,7 +4,11 @@ import shutil
 import sys
 from typing import Any, Protocol, TextIO
 
-from ocp.checks.arguments import check_callable
+from ocp.checks.arguments import check_callable, check_whole, class_in_words
+from ocp.checks.errors import ProblemError
+
+# Lets a terminal go one line up.
+_UP = "\x1b[A"
 
 
 class Progress(Protocol):
@@ -38,12 +42,23 @@ class TextProgress:
         stream: where it is written; default ``sys.stderr``. One that is no terminal gets a line
             for each report.
         width: of the bar, in letters.
+
+    Raises:
+        ProblemError: if the stream cannot be written to, or the width is no positive number.
     """
 
     def __init__(self, stream: TextIO | None = None, width: int = 20) -> None:
         """Begin a new line at the first report."""
+        is_file = all(hasattr(stream, name) for name in ("write", "flush", "isatty"))
+        if stream is not None and not is_file:
+            raise ProblemError(
+                f"TextProgress: stream is {class_in_words(stream)}, it cannot be written to; "
+                "give an open text file, or leave it out for sys.stderr"
+            )
         self._stream = stream
-        self._width = width
+        self._width = check_whole(width, "TextProgress: width")
+        # What was reported last of a computation that has not said its end.
+        self._last: int | None = None
 
     def __call__(self, done: int, total: int, said: str = "", /) -> None:
         """Write how far it is."""
@@ -52,7 +67,10 @@ class TextProgress:
         bar = f"[{'#' * filled}{'.' * (self._width - filled)}] {done} of {total}  {said}".rstrip()
         if stream.isatty():
             columns = shutil.get_terminal_size().columns - 1
-            stream.write(f"\r{bar[:columns]:<{columns}}{chr(10) * (done >= total)}")
+            # Each report ends its line, since nobody knows which one is the last; the next goes up.
+            goes_on = self._last is not None and self._last <= done
+            stream.write(f"{_UP if goes_on else ''}\r{bar[:columns]:<{columns}}\n")
+            self._last = done if done < total else None
         else:
             stream.write(f"{bar}\n")
         stream.flush()

@@ -10,11 +10,12 @@ import numpy as np
 
 from ocp.checks.arguments import check_instance, check_whole
 from ocp.checks.errors import ProblemError, SolverError
+from ocp.checks.progress import Progress
 from ocp.checks.rich_text import html_of
 from ocp.closed_loop.constraint_table import ConstraintTable
 from ocp.closed_loop.decision import Decision, InputSource
 from ocp.files.archive import made_of, read_archive, write_archive
-from ocp.loop_plotting.loop_record import Draw, Progress
+from ocp.loop_plotting.loop_record import Draw
 from ocp.plotting.compare import compared
 from ocp.plotting.view import View
 from ocp.problem.fingerprint import differing_in, fingerprint_entries
@@ -202,7 +203,7 @@ class Rollout:
                 between the samples.
             frames_per_second: 1 to 50.
             speed: seconds of the loop in a second of the film.
-            progress: called with the number of frames written and of all frames.
+            progress: told after each frame how many are written, and of how many.
 
         Raises:
             ProblemError: if there is nothing to show, there would be thousands of frames, or an

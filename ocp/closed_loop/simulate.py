@@ -67,14 +67,15 @@ def closed_loop(
         watch: called with every measurement and decision or refusal, as a ``FlightRecorder`` is;
             where it raises ``OSError``, as on a full disk, a warning says so, and it is called no
             more.
-        progress: told after each step how many are done, and which rungs decided.
+        progress: told after each step how many are done, and which rungs decided; an ``OSError``
+            of it is treated as one of ``watch``.
 
     Raises:
         ProblemError: if the plant takes another input than the controller sends, the duration is
             no multiple of dt, or a function of the plant returns what does not fit.
         Interrupted: on Ctrl-C; its ``so_far`` is the rollout until then.
     """
-    report = told(progress, "closed loop")
+    report = _WhileItLasts(told(progress, "closed loop"), "reports no more")
     _check(controller, plant, sensors, watch)
     steps = _steps(duration, dt)
     check_whole(seed, "closed loop: seed", least=0)
@@ -82,7 +83,7 @@ def closed_loop(
     controller.reset(first)
     late = delay_steps(controller.delay, dt)
     journal = Journal.begun(plant.ocp, plant.started(x0, seed), late)
-    observer = _Observing(watch) if watch else None
+    observer = _WhileItLasts(watch, "is watched no more") if watch else None
     loop = _Loop(controller, dt, sensors, observer, journal, [] if head_start else [first] * late)
     try:
         for k in range(-late if head_start else 0, steps):
@@ -145,7 +146,7 @@ class _Loop:
     controller: Controller
     dt: float
     sensors: SensorFault | None
-    watch: "_Observing | None"
+    watch: "_WhileItLasts | None"
     journal: Journal
     ahead: list[np.ndarray]
 
@@ -190,18 +191,24 @@ class _Loop:
 
 
 @dataclass(eq=False)
-class _Observing:
-    """Calls an observer until the system fails it: a full disk does not stop a plant."""
+class _WhileItLasts:
+    """Calls a function until the system fails it: a full disk does not stop a plant.
 
-    watch: Observer
+    Attributes:
+        function: of the user.
+        then: what the loop does without it, in words.
+    """
+
+    function: Callable[..., object]
+    then: str
     failed: bool = False
 
-    def __call__(self, told: np.ndarray, decided: Decision | ControlRefused) -> None:
+    def __call__(self, *given: object) -> None:
         if self.failed:
             return
         try:
-            self.watch(told, decided)
+            self.function(*given)
         except OSError as error:
             self.failed = True
-            said = f"closed loop: {error}; the loop goes on and is watched no more"
+            said = f"closed loop: {error}; the loop goes on and {self.then}"
             warnings.warn(said, RuntimeWarning, stacklevel=3)

@@ -12,8 +12,9 @@ from matplotlib.lines import Line2D
 
 from ocp.checks.arguments import check_callable, check_instance, check_positive, check_whole
 from ocp.checks.errors import ProblemError
+from ocp.checks.progress import Progress, told
 from ocp.files.draft import replacing
-from ocp.loop_plotting.loop_record import Draw, LoopRecord, Progress
+from ocp.loop_plotting.loop_record import Draw, LoopRecord
 from ocp.loop_plotting.plans import controls_ahead, plans_of, sends_controls, states_ahead
 from ocp.loop_plotting.rollout import COLOURS, labels, refuse_empty
 from ocp.solution.solution import Solution
@@ -41,6 +42,7 @@ def animate_rollout(
         raise ProblemError(f"animation: {path} is no .gif file")
     if draw is not None:
         check_callable(draw, "animation: draw")
+    report = told(progress, "animation")
     film = _Film.of(rollout, draw)
     film.show(float(times[0]))
     film.figure.draw_without_rendering()
@@ -51,8 +53,7 @@ def animate_rollout(
         for k, t in enumerate(times):
             film.show(float(t))
             writer.grab_frame()
-            if progress:
-                progress(k + 1, len(times))
+            report(k + 1, len(times))
         for _ in range(int(_STAYS * frames_per_second)):
             writer.grab_frame()
     return path
@@ -117,7 +118,9 @@ class _AnimatedPanel:
         self.axes.set_ylim(low - margin, high + margin)
         self.axes.set_ylabel(what)
         self.axes.grid(alpha=0.3)
-        self.axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        self.axes.legend(
+            self.past, list(names), fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5)
+        )
 
     def show(self, t: float, plan: Solution | None) -> None:
         """Draw what was until t [s], and what a plan says from then on."""

@@ -11,9 +11,8 @@ from ocp.solution.solution import Solution
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# (axes, x (nx,), t [s]) -> the scene; (frames written, frames in all).
+# (axes, x (nx,), t [s]) -> the scene.
 Draw = Callable[["Axes", np.ndarray, float], object]
-Progress = Callable[[int, int], object]
 
 
 class Source(Protocol):

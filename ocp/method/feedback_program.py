@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike
 
 from ocp.method.method_program import MethodProgram, RunResult
 from ocp.problem.run_data import RunData
-from ocp.solution.solution import Solution
+from ocp.solution.solution import SAME_INSTANT, Solution
 from ocp.solution.solver import FeedbackProgram, InitialGuess
-
-# Instants that differ by this share of the horizon are the same.
-_SAME_INSTANT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +70,7 @@ class FeedbackMethodProgram(MethodProgram, FeedbackProgram):
 
 def _is_same_run(one: RunData, other: RunData, duration: float) -> bool:
     """Whether two runs differ in the start alone, but for rounding."""
-    if abs(one.t0 - other.t0) > _SAME_INSTANT * duration:
+    if abs(one.t0 - other.t0) > SAME_INSTANT * duration:
         return False
     pairs = zip(one.values.values, other.values.values, strict=True)
     return one.values is other.values or all(np.array_equal(*pair) for pair in pairs)

@@ -13,7 +13,7 @@ from ocp.problem.model import Model
 from ocp.problem.ocp import OCP
 from ocp.problem.run_data import RunData
 from ocp.solution.solution import Solution
-from ocp.solution.solver import FeedbackProgram, InitialGuess, Program
+from ocp.solution.solver import FeedbackProgram, InitialGuess, Program, why_no_feedback
 
 
 class Rewriting(ABC):
@@ -88,9 +88,9 @@ class RewrittenProgram(FeedbackProgram):
         return judged(answer, self.accuracy, slack=self.slack)
 
     @property
-    def feeds_back(self) -> bool:
-        """Whether the inner program does."""
-        return isinstance(self.program, FeedbackProgram) and self.program.feeds_back
+    def no_feedback(self) -> str:
+        """Why the inner program does not."""
+        return why_no_feedback(self.program)
 
     def prepare_feedback(
         self,

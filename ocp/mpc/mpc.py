@@ -34,7 +34,7 @@ from ocp.mpc.step_inputs import Parameters
 from ocp.mpc.terms_of_one_horizon import refuse_terms_of_one_horizon
 from ocp.problem.ocp import OCP
 from ocp.problem.scaled import row_sizes
-from ocp.solution.solver import FeedbackProgram, InitialGuess, Solver
+from ocp.solution.solver import InitialGuess, Solver, why_no_feedback
 
 T = TypeVar("T")
 
@@ -160,10 +160,10 @@ class MPC:
     def _built(self) -> FallbackLadder:
         solver = self.solver.for_control_loop(compiled=self.compiled, time_limit=_TIME_LIMIT)
         program = solver.build(self.ocp)
-        if self.real_time and not (isinstance(program, FeedbackProgram) and program.feeds_back):
+        if self.real_time and (why := why_no_feedback(program)):
             raise UnsupportedProblem(
-                f"MPC of {self.ocp.name}: {self.solver!r} prepares no real-time iterations; take "
-                "MultipleShooting(backend='native'), or leave real_time out"
+                f"MPC of {self.ocp.name}: {self.solver!r} prepares no real-time iterations: {why}, "
+                "or leave real_time out"
             )
         ladder = FallbackLadder(
             ocp=self.ocp,
@@ -271,10 +271,11 @@ class MPC:
 
         That step then only corrects this plan by what was measured: one real-time iteration, which
         differs from a solve by second-order terms in the distance of the two states. The ladder
-        judges it like any plan that is not optimal: the model is run under its controls. Where it
-        is not good enough, the step comes at another time or with other parameters, or nothing was
-        prepared, the step solves as always. A rollout (``run``, ``closed_loop``) calls it after
-        every step; who calls ``step`` calls it when the input has been sent.
+        judges it like any plan that is not optimal: the model is run under its controls, and its
+        states must be those of the plan to 2 %. Where it is not good enough, the step comes at
+        another time or with other parameters, or nothing was prepared, the step solves as always.
+        A rollout (``run``, ``closed_loop``) calls it after every step; who calls ``step`` calls it
+        when the input has been sent.
 
         Args:
             parameters: of the horizon of the next step, by name; default: what the controller's
@@ -302,7 +303,10 @@ class MPC:
             ProblemError: if a callback of a step calls the controller.
         """
         if self._inside == get_ident():
-            raise ProblemError(f"MPC of {self.ocp.name}: step or reset is called inside a step")
+            raise ProblemError(
+                f"MPC of {self.ocp.name}: step, reset or prepare_next is called inside a step: "
+                "a callback of a controller cannot call it"
+            )
         # The statement, not its methods: Ctrl-C does not come between lock and block.
         with self._lock:
             self._inside = get_ident()

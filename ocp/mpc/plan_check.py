@@ -13,6 +13,7 @@ from ocp.problem.constraint_rows import ImposedRows
 from ocp.problem.fingerprint import differing, fingerprint
 from ocp.problem.ocp import OCP
 from ocp.problem.parameters import ParameterValues
+from ocp.problem.scaled import sizes_of
 from ocp.solution.control_rate import limited_rates
 from ocp.solution.shifted_plan import plan_controls
 from ocp.solution.solution import Solution
@@ -33,6 +34,9 @@ _USABLE = frozenset(
 )
 # Of an instant, relative to the interval: later than the end by less is the end.
 ROUNDING = 1e-6
+# States that differ from those of linear dynamics by more than this share, of sizes and magnitudes,
+# were not predicted by them.
+_BENT = 0.02
 _NO_PARAMETERS = np.empty(0)
 
 
@@ -117,6 +121,30 @@ class PlanCheck:
         if plan.status not in _USABLE:
             return np.inf, plan.status.value
         return max(self.remainder(plan, start, t, p), self._of_rates(plan))
+
+    def corrected_plan(
+        self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
+    ) -> tuple[float, str]:
+        """Return the same of a plan that a correction has made: its dynamics are linear.
+
+        Infinite where the model, run under its controls, leaves its states: then they are no
+        optimum, of whatever cost.
+        """
+        if foreign := self._foreign(plan, start, t):
+            return np.inf, foreign
+        u, between = plan_controls(plan, plan.t[:-1]), p.between(plan.t)
+        model = self._rollout(len(u))
+        result = model.of(start, u, plan.t, between)
+        if not isfinite(result.excess):
+            return np.inf, result.worst
+        reached = result.x
+        if plan.control_kind != "held":  # its average is nearer to a ramp than where that begins
+            middles = 0.5 * (plan.t[:-1] + plan.t[1:])
+            reached = model.of(start, plan_controls(plan, middles), plan.t, between).x
+        if (np.abs(reached - plan.x) > _BENT * (self._sizes + np.abs(plan.x))).any():
+            return np.inf, "the model leaves the states of linear dynamics"
+        end = model.end_excess(result.x[-1], plan.t[-1], p.at(plan.t[-1]))
+        return max((result.excess, result.worst), end, self._of_rates(plan))
 
     def violation(
         self, plan: Solution, start: np.ndarray, t: float, p: HorizonParameters
@@ -226,6 +254,10 @@ class PlanCheck:
     @cached_property
     def _duration(self) -> float:
         return self.ocp.duration
+
+    @cached_property
+    def _sizes(self) -> np.ndarray:
+        return sizes_of(self.ocp).x
 
     @cached_property
     def _is_constrained(self) -> bool:

@@ -87,7 +87,8 @@ class StepSolver:
     def _corrected(self, inputs: StepInputs) -> SolvedStep | None:
         """Return the plan that was prepared, corrected by the measured state.
 
-        None where there is none, or the model leaves the constraints under it: a solve decides.
+        None where there is none, or the model leaves its states or the constraints under it: a
+        solve decides.
         """
         if not isinstance(self.program, FeedbackProgram):
             return None
@@ -96,7 +97,7 @@ class StepSolver:
             plan = self.program.feedback(x0=start, t0=t, parameters=p.by_name)
         except CALLBACK_ERRORS:
             return None
-        if plan is None or self.check.new_plan(plan, start, t, p)[0] > self.tolerance:
+        if plan is None or self.check.corrected_plan(plan, start, t, p)[0] > self.tolerance:
             return None
         return SolvedStep(plan, plan.status, plan.message, is_corrected=True)
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ocp.plotting.curve import Curve, Limit, Line, Points
-from ocp.plotting.picture import finite_range
+from ocp.plotting.picture import NO_LABEL, finite_range
 from ocp.plotting.view import Abscissa
 
 # A limit that is farther from the curve than so many of its spans is named and not drawn.
@@ -102,7 +102,7 @@ def _draw_points(axes: Axes, place: Abscissa, points: Points) -> None:
     if exact.any():
         axes.plot(x[exact], y[exact], "D", color="black", markersize=5, markerfacecolor="white",
                   label=label, zorder=3, clip_on=False)  # fmt: skip
-        label = f"_{label}"
+        label = NO_LABEL
     for at, low, high in zip(x[~exact], points.lower[~exact], points.upper[~exact], strict=True):
         bottom, top = axes.get_ylim()
         ends = (low if np.isfinite(low) else bottom, high if np.isfinite(high) else top)
@@ -111,7 +111,7 @@ def _draw_points(axes: Axes, place: Abscissa, points: Points) -> None:
         for end in (low, high):
             if np.isfinite(end):
                 axes.plot([at], [end], "_", color="black", markersize=9, zorder=3, clip_on=False)
-        label = f"_{label}"
+        label = NO_LABEL
 
 
 # -- limits ---------------------------------------------------------------------------

@@ -7,9 +7,17 @@ from matplotlib.axes import Axes
 
 from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
-from ocp.plotting.picture import COLOURS, Picture, finite_range, legend, wrapped, write_title
+from ocp.plotting.picture import (
+    COLOURS,
+    NO_LABEL,
+    Picture,
+    finite_range,
+    legend,
+    wrapped,
+    write_title,
+)
 from ocp.plotting.run import Run
-from ocp.plotting.solution import styles
+from ocp.plotting.solution import check_comparable, styles
 from ocp.plotting.view import named
 
 _MARGIN, _NEAR, _SAME = 0.08, 0.5, 1e-9
@@ -23,18 +31,22 @@ def plot_plane(
     A circle marks the start, a square the end; limits are hatched where they are near.
 
     Raises:
-        ProblemError: if there are not two names, or one of them is of nothing.
+        ProblemError: if there are not two names, one of them is of nothing, the two are never known
+            at the same time, or runs do not compare.
     """
-    if isinstance(plane, str) or len(tuple(plane)) != 2:
+    if isinstance(plane, str) or not isinstance(plane, Sequence) or len(plane) != 2:
         raise ProblemError(f'plot: plane = {plane!r}: two names are needed, plane=("x", "v")')
+    check_comparable(runs)
     picture = Picture(figsize=(7.0, 5.2), layout="constrained")
     ax = picture.subplots()
     pairs = [[named(run.problem, run.curves, name)[0] for name in plane] for run in runs.values()]
     for (x, y), style, colour in zip(pairs, styles(runs).values(), COLOURS, strict=False):
         at = np.interp(y.t, x.t, x.values) if len(x.t) != len(y.t) else x.values
         ax.plot(at, y.values, color=colour, linestyle=style.line, linewidth=1.6,
-                label=style.label or "_run")  # fmt: skip
+                label=style.label or NO_LABEL)  # fmt: skip
         known = np.flatnonzero(np.isfinite(at) & np.isfinite(y.values))
+        if not known.size:
+            raise ProblemError(f"plot: {x.name} and {y.name} are never known at the same time")
         for k, marker, name in ((known[0], "o", "start"), (known[-1], "s", "end")):
             ax.plot(at[k], y.values[k], marker, color="black", markersize=6, zorder=3,
                     markerfacecolor="white", linestyle="none", label=name)  # fmt: skip

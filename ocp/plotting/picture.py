@@ -1,18 +1,25 @@
 """A figure whose axes are found by the names of what is drawn in them."""
 
 import io
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.container import Container
 from matplotlib.figure import Figure
 
 from ocp.checks.errors import ProblemError
 
 # The colours of Okabe and Ito that stand out on white: told apart by the colour-blind.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+#: The label of what stands in no legend; matplotlib's own word.
+NO_LABEL = "_nolegend_"
+# What matplotlib calls artists without a label.
+_AUTOMATIC = re.compile(r"_child\d+")
 _ONE_COLUMN, _TWO_COLUMNS = 6, 16
 _WIDTHS = {1: 8.0, 2: 13.0, 3: 18.0}
 _LINE = 18
@@ -100,9 +107,14 @@ def write_title(picture: Picture, title: str, *, is_good: bool) -> None:
 
 def legend(axes: Axes) -> None:
     """Put a legend to the right, where it hides nothing; each name stands in it once."""
-    handles, names = axes.get_legend_handles_labels()
-    once = {name: handle for handle, name in reversed(list(zip(handles, names, strict=True)))}
-    found = {name: once[name] for name in dict.fromkeys(names)}
+    found: dict[str, Artist | Container] = {}
+    drawn = {*axes.lines, *axes.patches, *axes.collections}
+    in_order = [artist for artist in axes.get_children() if artist in drawn]
+    for artist in (*in_order, *axes.containers):
+        name = str(artist.get_label() or NO_LABEL)
+        # matplotlib itself would leave out every name that begins with an underscore.
+        if name != NO_LABEL and not _AUTOMATIC.fullmatch(name):
+            found.setdefault(name, artist)
     if found:
         axes.legend(
             list(found.values()),

@@ -10,7 +10,16 @@ from ocp.checks.errors import ProblemError
 from ocp.plotting.curve import Curve
 from ocp.plotting.draw_panel import SOLID, Dashes, Drawn, Style, draw_panel
 from ocp.plotting.panels import Panel, panels_of
-from ocp.plotting.picture import COLOURS, Picture, laid_out, legend, name_axis, wrapped, write_title
+from ocp.plotting.picture import (
+    COLOURS,
+    NO_LABEL,
+    Picture,
+    laid_out,
+    legend,
+    name_axis,
+    wrapped,
+    write_title,
+)
 from ocp.plotting.run import Run
 from ocp.plotting.view import TIME_UNITS, Abscissa, View
 
@@ -38,7 +47,7 @@ def plot_runs(title: str, is_success: bool, runs: Mapping[str, Run], view: View)
     Raises:
         ProblemError: if a name is of nothing, the runs have different variables, or are too many.
     """
-    _check_comparable(runs)
+    check_comparable(runs)
     first = next(iter(runs.values()))
     chosen = view.chosen(first.problem, first.curves)
     if not chosen:
@@ -59,7 +68,8 @@ def plot_runs(title: str, is_success: bool, runs: Mapping[str, Run], view: View)
     return picture
 
 
-def _check_comparable(runs: Mapping[str, Run]) -> None:
+def check_comparable(runs: Mapping[str, Run]) -> None:
+    """Raise ``ProblemError`` if runs have other variables, or are too many for one picture."""
     first, *others = runs.values()
     for other in others:
         first.same_variables_as(other)
@@ -82,7 +92,7 @@ def _drawn(panel: Panel, runs: Mapping[str, Run], places: Mapping[str, Abscissa]
         for name, run in runs.items():
             style = of_run[name]
             colour = style.colour or COLOURS[k]
-            label = curve.name if several else "_line"
+            label = curve.name if several else NO_LABEL
             for own in _same(run, curve):
                 found.append(Drawn(own, places[name], colour, style.line, label))
     return found

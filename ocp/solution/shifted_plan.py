@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ocp.checks.errors import ProblemError
-from ocp.solution.solution import Solution
+from ocp.solution.solution import SAME_INSTANT, Solution
 
 
 class ShiftedPlan(NamedTuple):
@@ -63,7 +63,7 @@ def plan_controls(plan: Solution, times: np.ndarray | float) -> np.ndarray:
         # A new plan is asked for its first control at every step: nothing to look for.
         if isinstance(times, float) and times == plan.t[0]:
             return plan.u[0]
-        return plan.u[_interval(times + 1e-9 * plan.duration, plan.t)]
+        return plan.u[_interval(times + SAME_INSTANT * plan.duration, plan.t)]
     if plan.control_kind == "polynomial":
         values = plan.pieces.at(np.atleast_1d(times))
         return values if np.ndim(times) else values[0]

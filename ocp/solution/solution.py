@@ -36,6 +36,9 @@ from ocp.solution.solution_file import content_of, read_fields
 from ocp.solution.status import Status
 from ocp.solution.work import Work
 
+#: Instants that differ by this share of the horizon are the same: a control acts from its node on.
+SAME_INSTANT = 1e-9
+
 ControlKind = Literal["held", "linear", "polynomial", "extremal"]
 _KINDS = get_args(ControlKind)
 
@@ -244,7 +247,7 @@ class Solution(Plottable):
         if self.control_kind == "extremal":
             return self._extremal.control(times)
         if self.control_kind == "held":
-            index = np.searchsorted(self.t, times + 1e-9 * self.duration, side="right") - 1
+            index = np.searchsorted(self.t, times + SAME_INSTANT * self.duration, side="right") - 1
             return self.u[np.clip(index, 0, len(self.u) - 1)]
         if self.control_kind == "linear":
             return _interpolate(times, self.t, self.u)

@@ -77,8 +77,8 @@ class FeedbackProgram(Program):
 
     @property
     @abstractmethod
-    def feeds_back(self) -> bool:
-        """Whether it can for this problem with these options."""
+    def no_feedback(self) -> str:
+        """Why it cannot for this problem with these options; empty where it can."""
 
     @abstractmethod
     def prepare_feedback(
@@ -105,9 +105,17 @@ class FeedbackProgram(Program):
         """Correct the answer that was prepared for another start, once.
 
         Returns:
-            a solution with the status ``ITERATION_LIMIT``; None where nothing was prepared for this
-            time and these parameters, or the corrected problem has no solution.
+            a solution with the status ``ITERATION_LIMIT``, with cost and residual of the problem
+            itself; None where nothing was prepared for this time and these parameters, the
+            corrected problem has no solution, or it is no longer like the problem itself.
         """
+
+
+def why_no_feedback(program: Program) -> str:
+    """Return why a program prepares no feedback; empty where it does."""
+    if isinstance(program, FeedbackProgram):
+        return program.no_feedback
+    return "this method has none; take MultipleShooting(backend='native')"
 
 
 class Solver(Portable, ABC):

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Program
+from ocp import OCP, RK4, Grid, InitialGuess, Integrator, Program, Status
 from ocp.internal import (
     BlockingSolver,
     Epigraph,
@@ -221,15 +221,31 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     # -- real-time iterations ----------------------------------------------------------------
 
     @property
-    def feeds_back(self) -> bool:
-        """Whether the native backend is asked for, and start and final time are given.
+    def no_feedback(self) -> str:
+        """Why it cannot: another backend, a final time or a part of the start that is unknown.
 
-        Where it could not be compiled nothing gets prepared, and every step solves.
+        Where the native one could not be compiled nothing gets prepared, and every step solves.
         """
-        return self.solver.backend == "native" and self._is_given
+        if self.solver.backend != "native":
+            return "the backend is not the native one; take MultipleShooting(backend='native')"
+        names = self.ocp.model.x_names
+        free = [f"'{name}'" for name, on in zip(names, self.ocp.start_is_free, strict=True) if on]
+        if self.ocp.has_free_time:
+            free.append("the final time")
+        return f"a start that is measured does not give {', '.join(free)}" if free else ""
 
     def _freeze(self, data: RunData, guess: InitialGuess | None) -> bool:
-        return bool(self._warm_run and guess and self._warm_run.freeze(data, guess))
+        """Freeze the program at the answer of a warm run, or where that will not do of all phases.
+
+        A plan that is optimal already moves no control: the phases tell a minimum from a saddle.
+        """
+        if not (self._warm_run and guess):
+            return False
+        if self._warm_run.freeze(data, guess):
+            return True
+        found = self._solution(data, self._solve(data, guess), 0.0)
+        is_minimum = found.status is Status.SOLVED
+        return is_minimum and self._warm_run.freeze(data, found, is_minimum=True)
 
     def _fed_back(self, data: RunData) -> RunResult | None:
         return self._warm_run.fed_back(data) if self._warm_run else None
@@ -278,14 +294,9 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     @cached_property
     def _warm_run(self) -> WarmRun | None:
         """Runs from an earlier plan, for the native backend; None: all are ``NlpRun``'s."""
-        if not (isinstance(self.nlp, NativeNlp) and self._is_given):
+        if self.no_feedback or not isinstance(self.nlp, NativeNlp):
             return None
         return WarmRun(self.nlp.run, self.solver.accuracy)
-
-    @property
-    def _is_given(self) -> bool:
-        """Whether start and final time are given."""
-        return not (self.ocp.has_free_start or self.ocp.has_free_time)
 
     @cached_property
     def _solver_text(self) -> str:

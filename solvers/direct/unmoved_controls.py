@@ -4,17 +4,16 @@ import numpy as np
 
 from solvers.direct.nlp_verdict import NlpInputs
 from solvers.direct.transcribed_problem import TranscribedProblem
+from solvers.direct.warm_start import UNCHANGED
 
 # Standard deviation of the perturbation of the controls, relative to 1 + abs(u).
 _PERTURBATION = 1e-3
-# Changes of the controls below this, relative to 1 + abs(u), count as none.
-_UNCHANGED = 1e-6
 
 
 def unmoved(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> np.ndarray:
     """Return which controls are those of the first iterate all along the horizon, bool (nu,)."""
     before, after = (_controls(problem, each) for each in (inputs.w0, w))
-    changed = np.abs(after - before) > _UNCHANGED * (1.0 + np.abs(before))
+    changed = np.abs(after - before) > UNCHANGED * (1.0 + np.abs(before))
     return ~np.asarray(changed.any(axis=0))
 
 
@@ -23,7 +22,7 @@ def at_bounds(problem: TranscribedProblem, inputs: NlpInputs, w: np.ndarray) -> 
     u, lower, upper = (
         _controls(problem, each) for each in (w, inputs.bounds["lbx"], inputs.bounds["ubx"])
     )
-    near = _UNCHANGED * (1.0 + np.abs(u))
+    near = UNCHANGED * (1.0 + np.abs(u))
     inside = (u - lower > near) & (upper - u > near)
     return ~np.asarray(inside.any(axis=0))
 

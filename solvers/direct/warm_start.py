@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+#: Changes of the controls of a first iterate below this, relative to 1 + abs(u), count as none.
+UNCHANGED = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class WarmStart:

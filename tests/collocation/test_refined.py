@@ -25,7 +25,6 @@ from tests.tolerances import CERTIFIED, ROUNDING
 both = pytest.mark.parametrize("points", ["radau", "gauss"])
 
 
-@pytest.mark.over_library
 @both
 @pytest.mark.parametrize(
     ("make", "reference"),

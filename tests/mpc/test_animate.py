@@ -33,7 +33,7 @@ def test_a_film_has_the_frames_that_were_asked_for(rollout: Rollout, tmp_path: P
 
     file = rollout.animate(
         tmp_path / "new" / "film.gif", draw=draw, frames_per_second=5, speed=0.5,
-        progress=lambda k, n: told.append((k, n)),
+        progress=lambda k, n, said="": told.append((k, n)),
     )  # fmt: skip
     with Image.open(file) as film:
         durations = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
@@ -94,6 +94,7 @@ def test_planned_inputs_are_shown_where_controls_are_sent(rollout: Rollout) -> N
         ({"speed": np.nan}, "speed"),
         ({"speed": 1e-6}, "at most 3000"),
         ({"draw": "the cart"}, "draw is a .*, a function is needed"),
+        ({"progress": 3}, "progress is an int, a function is needed"),
     ],
 )
 def test_what_cannot_be_filmed_is_said(rollout: Rollout, tmp_path: Path, options, said) -> None:

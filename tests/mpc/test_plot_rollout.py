@@ -20,6 +20,7 @@ from ocp import (
     Signal,
     closed_loop,
 )
+from ocp.plotting.picture import NO_LABEL
 from solvers import MultipleShooting
 from tests.ocp.test_plot import legend, line
 
@@ -76,7 +77,7 @@ def test_states_inputs_limits_reference_and_what_was_told(faulty: Rollout) -> No
     assert set(wanted) == {0.0, 0.5}
     low, high = picture["position"].get_ylim()
     assert high - low < 3.0, "a broken sensor hides no curve"
-    _, force = line(picture["force"], "_line")
+    _, force = line(picture["force"], NO_LABEL)
     np.testing.assert_allclose(force, np.repeat(faulty.inputs[:, 0], 2))
     picture.savefig(io.BytesIO(), dpi=30)
 

@@ -14,15 +14,21 @@ from ocp import (
     OCP,
     Box,
     Constraint,
+    Decision,
     FlightRecorder,
+    Guess,
     InputSource,
     Model,
+    Parameter,
+    Peak,
     Plant,
     ProblemError,
     Rate,
+    Soft,
     Solution,
     Status,
     UnsupportedProblem,
+    evaluate,
     replay,
 )
 from ocp.internal import ShiftedPlan
@@ -132,6 +138,46 @@ def test_a_frozen_program_without_a_solution_has_no_answer() -> None:
     assert program.feedback(x0=[0.6, -3.0]) is None  # the speed cannot be met
 
 
+def test_no_saddle_is_frozen() -> None:
+    """Moving sideways by either y lowers the cost, and where y = 0 by symmetry nothing moves."""
+    x, u = ca.SX.sym("x", 2), ca.SX.sym("u", 2)
+    program = built(
+        OCP(
+            name="mirrored",
+            model=Model(name="mirrored", x=x, u=u, f=u),
+            x0=[0.0, 0.0],
+            horizon=1.0,
+            running_cost=ca.sumsqr(u) - 8.0 * x[1] ** 2 + 4.0 * x[1] ** 4,
+            terminal_cost=50.0 * (x[0] - 1.0) ** 2,
+        )
+    )
+    along = np.linspace(0.0, 1.0, N + 1)[:, None] * [50.0 / 51.0, 0.0]
+    pull = np.tile([-2.0 * 50.0 / 51.0, 0.0], (N + 1, 1))
+    saddle = Guess(x=along, u=-0.5 * pull, costate=pull)
+    start = np.zeros(2)
+    assert program.prepare_feedback(x0=start, guess=saddle)
+    found = program.feedback(x0=start)
+    assert found is not None
+    assert np.abs(found.u[:, 1]).max() > 0.1
+    assert found.cost < 0.9 * 50.0 / 51.0
+
+
+def test_nothing_is_frozen_for_other_parameters_than_it_is_asked_for() -> None:
+    pull = ca.SX.sym("p")
+    program = built(
+        pendulum(
+            model=Model(name="pulled", x=X, u=U, f=ca.vertcat(X[1], U + pull * ca.sin(X[0]))),
+            parameters=(Parameter("p", pull, 1.0),),
+            constraints=(),
+        )
+    )
+    base = program.run().or_raise()
+    x0 = base.x[0]
+    for prepared, asked, is_there in ((1.0, 2.0, False), (2.0, 2.0, True), (2.0, 1.0, False)):
+        assert program.prepare_feedback(x0=x0, guess=base, parameters={"p": prepared})
+        assert (program.feedback(x0=x0, parameters={"p": asked}) is not None) == is_there
+
+
 # -- in the loop ------------------------------------------------------------------------------
 
 
@@ -165,6 +211,55 @@ def test_a_push_that_the_correction_does_not_survive_is_solved_for() -> None:
     assert mpc.step(x, 2.3 * DT).source is InputSource.OPTIMAL  # not when it was expected
 
 
+def moved(mpc: MPC, by: list[float]) -> Decision:
+    """Decide from a state that is that far from the one a prepared plan is for."""
+    plan = mpc.step([0.6, 0.2], 0.0).plan
+    assert plan is not None
+    assert mpc.prepare_next()
+    return mpc.step(plan.state(DT) + by, DT)
+
+
+@pytest.fixture(scope="module")
+def free() -> MPC:
+    """A controller of a pendulum without rows that a roll-out could violate."""
+    return controller(pendulum(constraints=()), real_time=True)
+
+
+def test_where_the_model_leaves_the_states_of_a_correction_a_solve_decides(free) -> None:
+    free.reset()
+    assert moved(free, [0.01, 0.02]).source is InputSource.REAL_TIME
+    free.reset()
+    far = moved(free, [2.4, 0.0])
+    assert far.source is InputSource.OPTIMAL
+    assert far.plan is not None
+    assert far.plan.cost == pytest.approx(evaluate(far.plan).cost, rel=1e-3)
+
+
+def test_a_correction_says_the_residual_of_the_problem_itself(free) -> None:
+    residuals = []
+    for size in (0.08, 0.04, 0.02):  # so far that no other bound is active
+        free.reset()
+        decision = moved(free, [-size, size])
+        assert decision.source is InputSource.REAL_TIME
+        assert decision.plan is not None
+        assert decision.plan.cost == pytest.approx(evaluate(decision.plan).cost, rel=1e-3)
+        residuals.append(decision.residual)
+    order = np.log2(np.array(residuals[:-1]) / residuals[1:])
+    np.testing.assert_allclose(order, 2.0, atol=0.3)
+
+
+def test_a_cost_that_is_not_the_quadratic_one_is_no_answer() -> None:
+    ocp = linear()
+    quartic = pendulum(
+        name="quartic", model=ocp.model, constraints=(), running_cost=X[0] ** 4 + 0.05 * U**2
+    )
+    program = built(quartic)
+    base = program.run().or_raise()
+    for x0, is_near in (([0.61, 0.2], True), ([2.6, 0.2], False)):
+        assert program.prepare_feedback(x0=base.x[0], guess=base)
+        assert (program.feedback(x0=x0) is not None) == is_near
+
+
 def test_without_preparation_every_step_solves() -> None:
     mpc = controller(pendulum(), real_time=True)
     assert not mpc.prepare_next()  # there is no step yet
@@ -180,6 +275,43 @@ def test_delays_are_part_of_what_is_expected() -> None:
     start = np.array([0.0, np.pi - 0.1, 0.0, 0.0])
     rollout = controller(ocp, real_time=True, delay=2 * DT).run(Plant(ocp=ocp), start, 1.0)
     assert set(rollout.sources[1:]) == {InputSource.REAL_TIME}
+
+
+def test_a_delay_that_is_not_compensated_is_no_part_of_what_is_expected() -> None:
+    ocp, start = cart_pole_upright(), np.array([0.0, np.pi - 0.1, 0.0, 0.0])
+    solving, correcting = (
+        controller(ocp, real_time=on, delay=DT, compensate=False).run(Plant(ocp=ocp), start, 1.0)
+        for on in (False, True)
+    )
+    assert set(correcting.sources[1:]) == {InputSource.REAL_TIME}
+    np.testing.assert_allclose(correcting.inputs, solving.inputs, atol=1e-4)
+
+
+def test_a_reference_that_changes_after_the_preparation_is_solved_for() -> None:
+    aim = ca.SX.sym("aim")
+    ocp = pendulum(
+        running_cost=4.0 * (X[0] - aim) ** 2 + 0.1 * X[1] ** 2 + 0.05 * U**2,
+        parameters=(Parameter("aim", aim, 0.0),),
+        constraints=(),
+    )
+    aims = {"aim": 0.0}
+    mpc = controller(ocp, real_time=True, parameters=lambda t: aims)
+    plan = mpc.step([0.6, 0.2], 0.0).plan
+    for k, (before, after, source) in enumerate(
+        (
+            (0.0, 0.0, InputSource.REAL_TIME),
+            (0.0, 0.5, InputSource.OPTIMAL),
+            (0.5, 0.5, InputSource.REAL_TIME),
+        ),
+        start=1,
+    ):
+        aims["aim"] = before
+        assert mpc.prepare_next()
+        aims["aim"] = after
+        assert plan is not None
+        decision = mpc.step(plan.state(k * DT), k * DT)
+        assert decision.source is source
+        plan = decision.plan
 
 
 @pytest.mark.parametrize("compensate", [True, False])
@@ -240,6 +372,15 @@ def test_a_solver_that_cannot_is_refused_by_name(solver) -> None:
     ocp = pendulum(constraints=(), control_bounds=Box())
     with pytest.raises(UnsupportedProblem, match=r"held up: .*prepares no real-time iterations"):
         MPC(ocp=ocp, solver=solver, dt=DT, compiled=False, real_time=True)
+
+
+def test_a_term_that_needs_a_free_constant_is_refused_by_its_name() -> None:
+    peaks = pendulum(peaks=(Peak("speed", X[1], weight=1.0),), constraints=())
+    late = Constraint("late", X[0] + X[1], upper=0.0, at="terminal", soft=Soft(linear=3.0))
+    for ocp, name in ((peaks, "peak of speed"), (pendulum(constraints=(late,)), "excess of late")):
+        with pytest.raises(UnsupportedProblem, match=rf"held up: .*does not give '{name}'") as said:
+            controller(ocp, real_time=True)
+        assert "backend='native')" not in str(said.value).split("prepares no", 1)[1]
 
 
 def test_the_option_is_a_flag() -> None:

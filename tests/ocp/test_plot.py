@@ -28,6 +28,7 @@ from ocp import (
     solve,
 )
 from ocp.plotting.curves import curves_of
+from ocp.plotting.picture import NO_LABEL
 from ocp.plotting.references import references_of
 from ocp.plotting.trajectory import Trajectory
 from solvers import Collocation, IndirectShooting, MultipleShooting
@@ -132,11 +133,11 @@ def test_points_of_constraints_are_in_the_units_of_the_variable(cooled: Solution
 
 def test_held_controls_are_steps_and_extremals_are_smooth() -> None:
     held = MultipleShooting(intervals=4).build(energy()).run()
-    t, u = line(held.plot()["u"], "_line")
+    t, u = line(held.plot()["u"], NO_LABEL)
     np.testing.assert_allclose(u, np.repeat(held.u[:, 0], 2))
     np.testing.assert_allclose(t, np.repeat(held.t, 2)[1:-1])
     extremal = IndirectShooting(segments=2, steps=4).build(energy()).run(guess=held)
-    t, u = line(extremal.plot()["u"], "_line")
+    t, u = line(extremal.plot()["u"], NO_LABEL)
     assert len(t) > 100
     np.testing.assert_allclose(u, 6 - 12 * t, atol=1e-5)
 
@@ -233,7 +234,7 @@ def test_algebraic_variables_have_a_panel() -> None:
 def test_against_another_variable(cooled: Solution) -> None:
     picture = cooled.plot(("concentration", "heating"), against="temperature")
     assert picture.axes[-1].get_xlabel() == "temperature [°C]"
-    t, _ = line(picture["heating"], "_line")
+    t, _ = line(picture["heating"], NO_LABEL)
     np.testing.assert_allclose(t[[0, -1]], cooled.x[[0, -1], 1])
 
 
@@ -241,7 +242,7 @@ def test_a_phase_plane(cooled: Solution) -> None:
     picture = cooled.plot(plane=("concentration", "temperature"))
     (axes,) = picture.axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("concentration [mol/l]", "temperature [°C]")
-    np.testing.assert_allclose(line(axes, "_run")[1][[0, -1]], cooled.x[[0, -1], 1])
+    np.testing.assert_allclose(line(axes, NO_LABEL)[1][[0, -1]], cooled.x[[0, -1], 1])
     assert legend(axes)[:2] == ["start", "end"]
 
 
@@ -249,7 +250,7 @@ def test_solutions_are_compared(cooled: Solution) -> None:
     other = trajectory(reactor(name="hotter", horizon=3.0), np.full((4, 1), -100.0))
     picture = cooled.plot(compare={"hotter": other})
     assert [t.get_text() for t in picture.legends[0].get_texts()] == ["this one", "hotter"]
-    lines = [x for x in picture["temperature"].lines if x.get_label() == "_line"]
+    lines = [x for x in picture["temperature"].lines if x.get_label() == NO_LABEL]
     assert len(lines) == 2
     assert len({x.get_color() for x in lines}) == 2
     assert np.asarray(lines[1].get_xdata())[-1] == 3.0
@@ -269,7 +270,7 @@ def test_phases_are_named_and_what_has_one_name_is_one_curve() -> None:
     picture = found.plot()
     assert picture.names == ("height", "speed", "push")
     assert [text.get_text() for text in picture.axes[0].texts] == ["fall", "rise"]
-    t, speed = line(picture["speed"], "_line")
+    t, speed = line(picture["speed"], NO_LABEL)
     gap = int(np.flatnonzero(np.isnan(speed))[0])
     assert t[gap - 1] == t[gap + 1] == found.t[1]
     assert speed[gap + 1] == pytest.approx(-0.8 * speed[gap - 1])
@@ -293,6 +294,7 @@ def test_phases_are_named_and_what_has_one_name_is_one_curve() -> None:
         ({"costates": "yes"}, "costates"),
         ({"plane": ("concentration",)}, "two names are needed"),
         ({"plane": ("concentration", "way")}, "'way' is nothing of"),
+        ({"plane": 3}, "plane = 3: two names are needed"),
         ({"compare": 3}, "int in it: give a Solution"),
         ({"compare": {}}, "compare is empty"),
         ({"compare": trajectory(energy(), np.zeros((3, 1)))}, "different problems have nothing"),
@@ -311,6 +313,37 @@ def test_a_dollar_in_a_name_is_no_formula() -> None:
     other = {"$_{ and $": solution}
     solution.plot(compare=other).savefig(io.BytesIO(), dpi=30)
     solution.plot(plane=(str(x), "u"), compare=other).savefig(io.BytesIO(), dpi=30)
+
+
+def test_a_name_may_begin_with_an_underscore() -> None:
+    x, u = ca.SX.sym("_x", 2), ca.SX.sym("u")
+    model = Model(name="m", x=x, u=u, f=ca.vertcat(u, u), x_units=("m", "m"))
+    ocp = OCP(name="m", model=model, x0=[1.0, 1.0], horizon=1.0, running_cost=u**2)
+    solution = trajectory(ocp, np.ones((3, 1)))
+    panel = solution.plot()["_x_0"]
+    assert legend(panel) == ["_x_0", "_x_1"]
+    compared = {"_warm": solution}
+    plane = solution.plot(plane=("_x_0", "_x_1"), compare=compared).axes[0]
+    assert legend(plane) == ["this one", "start", "end", "_warm"]
+
+
+def test_a_plane_of_what_is_never_known_together_or_of_too_many_is_refused(cooled) -> None:
+    h, q, u = (ca.SX.sym(name) for name in "hqu")
+    up, on = (
+        OCP(
+            name=str(x),
+            model=Model(name=str(x), x=x, u=u, f=u),
+            x0=[0.0],
+            horizon=1.0,
+            running_cost=u**2,
+        )
+        for x in (h, q)
+    )
+    found = solve(Phases("both", (up, on), (Link(ca.SX(0.0)),)), Collocation(3))
+    with pytest.raises(ProblemError, match="h and q are never known at the same time"):
+        found.plot(plane=("h", "q"))
+    with pytest.raises(ProblemError, match="7 solutions in one picture, 6 at most"):
+        cooled.plot(plane=("concentration", "temperature"), compare=dict.fromkeys("abcdef", cooled))
 
 
 def test_axes_that_are_not_there_are_said(cooled: Solution) -> None:

@@ -8,6 +8,7 @@ import pytest
 from ocp import OCP, Box, FeedbackLaw, Interrupted, Model, Plant, ProblemError, Rollout
 
 from ocp import TextProgress, closed_loop, solve  # isort: skip
+from ocp.closed_loop.plant import RunningPlant
 from solvers import (
     CertifyOptions,
     Collocation,
@@ -101,10 +102,63 @@ def test_a_terminal_gets_one_line() -> None:
 
     stream = Terminal()
     bar = TextProgress(stream)
-    bar(1, 2, "half")
-    bar(2, 2, "all")
-    assert stream.getvalue().count("\n") == 1
-    assert stream.getvalue().count("\r") == 2
+    for _ in range(2):
+        bar(1, 3, "a third")
+        bar(2, 3, "more")  # the last report: the computation has stopped
+    bar(3, 3, "all")
+    up = "\x1b[A"
+    lines = stream.getvalue().split("\n")
+    assert [line.startswith(up) for line in lines] == [False, True, False, True, True, False]
+    assert lines[-1] == "", "what is written next begins a line"
+    bar(3, 3, "another")
+    assert up not in stream.getvalue().split("\n")[-2]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"stream": 3}, "stream is .*it cannot be written to"),
+        ({"width": -3}, "width"),
+        ({"width": 2.5}, "width"),
+    ],
+)
+def test_a_bar_that_cannot_be_drawn_is_refused(options, said) -> None:
+    with pytest.raises(ProblemError, match=said):
+        TextProgress(**options)
+
+
+def test_a_report_that_the_system_fails_does_not_end_a_loop() -> None:
+    reports = []
+
+    def report(done: int, total: int, said: str = "", /) -> None:
+        reports.append(done)
+        if done == 2:
+            raise OSError(28, "No space left on device")
+
+    law = FeedbackLaw(law=lambda x, t: [-x[0]])
+    with pytest.warns(RuntimeWarning, match="No space left .* reports no more"):
+        rollout = closed_loop(law, Plant(ocp=LAG), [1.0], 0.5, dt=0.1, progress=report)
+    assert reports == [1, 2]
+    assert len(rollout.inputs) == 5
+
+
+def test_ctrl_c_while_the_plant_moves_leaves_whole_steps(monkeypatch) -> None:
+    calls, advance = [], RunningPlant.advance
+
+    def stopped(self, given, dt):
+        calls.append(given)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return advance(self, given, dt)
+
+    monkeypatch.setattr(RunningPlant, "advance", stopped)
+    with pytest.raises(Interrupted) as told:
+        run("loop", Told())
+    found = told.value.so_far
+    assert found.ended == "stopped by Ctrl-C"
+    assert len(found.t) == len(found.x) == 3
+    for name in ("inputs", "measured", "costs", "decisions", "sources", "messages", "step_times"):
+        assert len(getattr(found, name)) == 2, name
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -117,9 +117,12 @@ def test_threads_get_the_answers_of_one(what: str) -> None:
     assert in_a_process(SHARED.format(what=what, count=40)) == "True True"
 
 
-@pytest.mark.over_library
 @pytest.mark.slow
-@pytest.mark.parametrize("what", WHAT)
+@pytest.mark.parametrize(
+    "what",
+    # The dearest is one of those that `make test` leaves to `make nightly`.
+    [pytest.param(w, marks=[pytest.mark.over_library] * (w == "two_programs")) for w in WHAT],
+)
 def test_threads_get_the_answers_of_one_for_long(what: str) -> None:
     count = 1000 if what == "two_controllers" else 2000
     assert in_a_process(SHARED.format(what=what, count=count)) == "True True"

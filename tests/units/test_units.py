@@ -331,7 +331,6 @@ def test_an_orbit_in_any_unit(metre: float, second: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.over_library
 @pytest.mark.parametrize(("metre", "second"), UNITS)
 def test_an_orbit_in_any_unit_is_diagnosed_as_solved(metre: float, second: float) -> None:
     findings = diagnose(transfer(metre, second)).findings

@@ -153,6 +153,10 @@ class NativeLibrary:
         """Freeze the program at the answer of the last solve, see ``frozen.h``."""
         self.library.native_freeze(self._block)
 
+    def judge(self) -> None:
+        """Let ``report`` say what a frozen program's answer is worth in the problem itself."""
+        self.library.native_judge(self._block)
+
     def solve(self, options: NativeOptions) -> int:
         """Solve from what is in the arrays; return how it ended, an ``Ending``.
 

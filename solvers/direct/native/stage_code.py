@@ -10,6 +10,7 @@ import numpy as np
 
 from ocp import OCP, Integrator
 from ocp.internal import (
+    SAME_INSTANT,
     Stage,
     StageInputs,
     StageTape,
@@ -18,7 +19,10 @@ from ocp.internal import (
     sizes_of,
 )
 from solvers.direct.native.lane_code import lane_code
+from solvers.direct.warm_start import UNCHANGED
 
+#: Iterations of which something is noted.
+NOTED = 512
 _CORE = Path(__file__).with_name("core")
 #: Files of the fixed part after the generated one, in the order in which the compiler reads them.
 FILES = (
@@ -201,7 +205,9 @@ class StageCode:
         nc, ni, ne = self.row_counts
         sizes = {"NX": self.nx, "NU": self.nu, "NW": self.nu + self.nx, "NB": len(self.bounded)}
         sizes |= {"NC": nc, "NI": ni, "NE": ne, "ND": self.nd}
-        lines = [f"#define {name} {value}" for name, value in sizes.items()]
+        numbers = {"SAME_INSTANT": SAME_INSTANT, "UNCHANGED": UNCHANGED}
+        lines = [f"#define {name} {value}" for name, value in (sizes | numbers).items()]
+        lines += ["#ifndef NOTED", f"#define NOTED {NOTED}", "#endif"]  # a test notes fewer
         entries = ", ".join(map(str, self.bounded or (0,)))
         return "\n".join([*lines, f"static const int bounded[] = {{{entries}}};"])
 

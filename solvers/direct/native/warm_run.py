@@ -31,6 +31,8 @@ from solvers.direct.nlp_verdict import NOT_STATIONARY, VIOLATED
 from solvers.direct.warm_start import WarmStart
 
 _SOLVED = ENDINGS.index("solved")
+# A cost that differs from the quadratic one by more than this share is not what was minimised.
+_BENT = 0.02
 _FED_BACK = "one real-time iteration, from the plan for the state that was expected"
 
 
@@ -62,12 +64,22 @@ class WarmRun:
                 return self._result(data, report)
         return None if ending is None else WarmStart(None, ending, perf_counter() - started)
 
-    def freeze(self, data: RunData, guess: InitialGuess) -> bool:
-        """Run from a guess, and freeze the program at the answer; return whether there is one."""
+    def freeze(self, data: RunData, guess: InitialGuess, *, is_minimum: bool = False) -> bool:
+        """Run from a guess, and freeze the program at the answer; return whether there is one.
+
+        Args:
+            data: of the run.
+            guess: has states and costates.
+            is_minimum: whether it is known to be one. Where it is not, an answer of which some
+                control did not move may be a saddle, and is none.
+        """
         library = self.solver.library
         if self._ended(data, guess) != _SOLVED:
             return False
-        if not self._is_right(library.account(), library.report()):
+        account = library.account()
+        if not self._is_right(account, library.report()):
+            return False
+        if account.unmoved > 0.0 and not is_minimum:
             return False
         library.freeze()
         return True
@@ -75,7 +87,9 @@ class WarmRun:
     def fed_back(self, data: RunData) -> RunResult | None:
         """Return the answer of the program that was frozen last for another start; None: none.
 
-        The states are those of the frozen program, whose dynamics are linear.
+        The states are those of the frozen program, whose dynamics are linear; cost and residual are
+        those of the problem itself there. Where its cost is not the one that the frozen program
+        said, that has no answer.
         """
         library = self.solver.library
         self._arrays.x[0] = data.x0
@@ -83,9 +97,12 @@ class WarmRun:
         if all(library.solve(options) != _SOLVED for options in self._frozen_options):
             return None
         library.account()
-        return replace(
-            self._result(data, library.report()), status=Status.ITERATION_LIMIT, message=_FED_BACK
-        )
+        said = library.report().cost
+        library.judge()
+        report = library.report()
+        if abs(report.cost - said) > _BENT * abs(report.cost) + self.solver.limits.tolerance:
+            return None
+        return replace(self._result(data, report), status=Status.ITERATION_LIMIT, message=_FED_BACK)
 
     def _ended(self, data: RunData, guess: InitialGuess) -> int | None:
         """Solve from a guess; return how that has ended, None where it has no first iterate."""

@@ -1,8 +1,5 @@
 /* What the answer of a solve is worth, beside the optimality conditions. */
 
-/* Changes of a control below this, relative to 1 + abs(u), count as none. */
-#define UNCHANGED 1e-6
-
 typedef struct {
   double moved;   /* by half the integration step: the largest change of a state, relative */
   double node;    /* where */

@@ -90,6 +90,14 @@ void native_freeze(char *block) {
   freeze(s);
 }
 
+/* Evaluate the problem itself at the answer of a frozen program; native_report() then gives its
+ * cost, and what it leaves of its conditions. */
+void native_judge(char *block) {
+  Workspace *s = (Workspace *)block;
+  evaluate_at_iterate(s, 0);
+  s->left = residuals(s, 0.0);
+}
+
 /* What a solve has come to. */
 void native_report(const char *block, double *report) {
   const Workspace *s = (const Workspace *)block;

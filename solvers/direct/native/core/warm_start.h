@@ -1,8 +1,5 @@
 /* The first iterate of a warm start: an earlier plan, moved to now and into the bounds. */
 
-/* Instants that differ by this share of the horizon are the same: a control acts from its node on. */
-#define SAME_INSTANT 1e-9
-
 /* What a plan says at a share of the way from one of its rows to the next. */
 static void between(const double *rows, int width, int left, double share, double *result) {
   const double *below = rows + (size_t)left * width, *above = below + width;

@@ -7,6 +7,9 @@
  *   NB             number of entries of w that may have a bound; bounded[NB]: which
  *   NC, NI, NE     rows of every stage, rows of the start alone, rows of the end
  *   ND             data of a node (times and parameters)
+ *   NOTED          iterations of which something is noted; beyond, the last note is of the newest
+ *   SAME_INSTANT   instants that differ by this share of the horizon are the same
+ *   UNCHANGED      changes of a control below this, relative to 1 + abs(u), count as none
  *
  * and functions of arrays of lanes (see lanes.h), which take their arguments one after the other and
  * return their values so; x is (NX), u (NU), d (ND), lambda (NX), y as many as rows, and matrices
@@ -36,10 +39,6 @@
 
 /* Pairs that a filter remembers; beyond, the oldest is forgotten. */
 #define FILTER 64
-/* Iterations of which something is noted; beyond, the last note is that of the newest. */
-#ifndef NOTED
-#define NOTED 512
-#endif
 
 typedef struct {
   double tolerance;     /* of the optimality conditions */
