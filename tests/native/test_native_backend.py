@@ -316,7 +316,7 @@ LIBRARY = [
 @pytest.mark.parametrize("case", LIBRARY, ids=lambda case: case.name)
 def test_it_finds_the_optimum_of_ipopt_in_the_library(case) -> None:
     ocp = case.build()
-    if len({float(t) for m in ocp.data for t in np.asarray(m.times)}) >= NATIVE.intervals:
+    if len({float(t) for m in ocp.data for t in np.asarray(m.times)}) >= 20:
         pytest.skip("it has more instants of data than this grid has intervals")
     native, ipopt = (solve(ocp, solver) for solver in (NATIVE, IPOPT))
     assert "IPOPT" not in native.message or case.name in BY_IPOPT
