@@ -217,7 +217,7 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     @property
     def no_feedback(self) -> str:
         """Why it cannot: another backend, a final time or a part of the start that is unknown."""
-        if not isinstance(self.nlp, NativeNlp):
+        if self.solver.backend != "native":
             return "the backend is not the native one; take MultipleShooting(backend='native')"
         names = self.ocp.model.x_names
         free = [f"'{name}'" for name, on in zip(names, self.ocp.start_is_free, strict=True) if on]
@@ -275,9 +275,8 @@ class MultipleShootingProgram(FeedbackMethodProgram):
     @cached_property
     def _warm_run(self) -> WarmRun | None:
         """Runs from an earlier plan, for the native backend; None: all are ``NlpRun``'s."""
-        if self.no_feedback:
+        if self.no_feedback or not isinstance(self.nlp, NativeNlp):
             return None
-        assert isinstance(self.nlp, NativeNlp)
         return WarmRun(self.nlp.run, self.solver.accuracy)
 
     # -- the result ---------------------------------------------------------------------------
