@@ -303,7 +303,7 @@ ELSEWHERE = (
     "periodic-algae",
 )  # fmt: skip
 # What the native solver hands over at 20 intervals.
-BY_IPOPT: tuple[str, ...] = ()
+BY_IPOPT: tuple[str, ...] = ("methanol",)
 LIBRARY = [
     case
     for case in all_cases()
