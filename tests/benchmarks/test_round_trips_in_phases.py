@@ -22,8 +22,8 @@ def cut(ocp: OCP) -> Phases | None:
     """The first half with what holds at the start, the second with what holds at the end."""
     m, coupled = ocp.model, ocp.refers_to_start or ocp.at("integral")
     signals = any(isinstance(entry, Signal) for entry in ocp.parameters)
-    # A control with a rate begins each phase anew.
-    coupled = coupled or bool(ocp.rates)
+    # A control with a rate begins each phase anew, and each phase pays for a peak of its own.
+    coupled = coupled or bool(ocp.rates) or bool(ocp.peaks)
     if m.is_discrete or ocp.has_free_time or ocp.unknowns or coupled or signals:
         return None
     given = {"horizon": ocp.duration / 2, "guess": None}
