@@ -1,5 +1,7 @@
 """Numbers that a user gives, checked once and named in the message."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,21 @@ _ROUNDING = 1e-12
 def vector(values: ArrayLike, size: int, what: str) -> np.ndarray:
     """Return ``values`` as ``ocp.numbers`` does; one number does not stand for all."""
     return check_numbers(values, size, what, repeat=False)
+
+
+def returned_expression(value: Any, shape: tuple[int, int], what: str) -> ca.SX:
+    """Return what a function of a user returned, an expression or numbers, as a dense expression.
+
+    Raises:
+        ProblemError: on another shape, and on what is neither.
+    """
+    try:
+        found = ca.SX(ca.vertcat(*value) if isinstance(value, list | tuple) else value)
+    except (TypeError, ValueError, NotImplementedError) as error:
+        raise ProblemError(f"{what}: it returns a {type(value).__name__}, no casadi.SX") from error
+    if found.shape != shape:
+        raise ProblemError(f"{what}: it returns shape {found.shape}, {shape} is needed")
+    return ca.densify(found)
 
 
 def checked_matrix(

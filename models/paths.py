@@ -5,8 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 from numpy.typing import ArrayLike
 
-from models._numbers import vector
-from ocp import ProblemError
+from models._numbers import returned_expression, vector
 from ocp.internal import check_callable
 
 # Time t [s], an SX, to the position (2,) [m].
@@ -39,14 +38,7 @@ def path_position(path: Path, t: ca.SX) -> ca.SX:
         ProblemError: if the path does not return two expressions or numbers.
     """
     check_callable(path, "path")
-    position = path(t)
-    try:
-        column = ca.SX(ca.vertcat(*position) if isinstance(position, list | tuple) else position)
-    except (TypeError, ValueError, NotImplementedError) as error:
-        raise ProblemError(f"path: it returns a {type(position).__name__}, no casadi.SX") from error
-    if column.shape != (2, 1):
-        raise ProblemError(f"path: it returns shape {column.shape}, (2, 1) is needed")
-    return ca.densify(column)
+    return returned_expression(path(t), (2, 1), "path")
 
 
 def path_velocity(path: Path, t: ca.SX) -> ca.SX:

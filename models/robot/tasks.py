@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models._numbers import checked_matrix, checked_rotation, vector
+from models._numbers import checked_matrix, checked_rotation, returned_expression, vector
 from models.robot.orientation import rotation_error
 from models.robot.robot import Robot
 from ocp import ProblemError
@@ -198,10 +198,4 @@ class PoseTask(SpaceTask):
 def _at(given: Any, t: ca.SX, shape: tuple[int, int], what: str) -> ca.SX:
     """Return numbers, or what a function says at t, as a dense expression."""
     value: Any = given(t) if callable(given) else np.asarray(given, dtype=float).reshape(shape)
-    try:
-        found = ca.SX(ca.vertcat(*value) if isinstance(value, list | tuple) else value)
-    except (TypeError, ValueError, NotImplementedError) as error:
-        raise ProblemError(f"{what}: it returns a {type(value).__name__}, no casadi.SX") from error
-    if found.shape != shape:
-        raise ProblemError(f"{what}: it returns shape {found.shape}, {shape} is needed")
-    return ca.densify(found)
+    return returned_expression(value, shape, what)

@@ -4,30 +4,24 @@ import shlex
 import shutil
 from pathlib import Path
 
-import casadi as ca
 import pytest
 
-from ocp import MPC, OCP, Box, Model, Parameter, Plant, Rollout, Signal
+from ocp import MPC, OCP, Box, Parameter, Plant, Rollout, Signal
 from ocp.codegen.run_limited import run_limited
 from solvers import MultipleShooting
+from tests.native import pendulum
+from tests.native.pendulum import PULL, WIND
 
 STRICT = ("-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 NATIVE = MultipleShooting(12, backend="native", judged=False)
 
-X, U, PULL, WIND = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("pull"), ca.SX.sym("wind")
-
 
 def pushed(**changes) -> OCP:
     """A pendulum in the wind, with a parameter, a signal, and a bound of the input that is met."""
     given = {
-        "name": "pushed",
-        "model": Model(
-            name="pendulum", x=X, u=U, f=ca.vertcat(X[1], U + PULL * ca.sin(X[0]) + WIND)
-        ),
         "x0": [0.5, 0.0],
         "horizon": 1.2,
-        "running_cost": X[0] ** 2 + 0.1 * X[1] ** 2 + 0.05 * U**2,
         "control_bounds": Box(-1.2, 1.2),
         "state_bounds": Box([-2.0, -1.5], [2.0, 1.5]),
         "parameters": (
@@ -35,7 +29,7 @@ def pushed(**changes) -> OCP:
             Signal("wind", WIND, [0.1, -0.2, 0.3], hold="linear"),
         ),
     }
-    return OCP(**(given | changes))
+    return pendulum.pushed(**(given | changes))
 
 
 def loop_of(ocp: OCP, steps: int, noise: list[float], **options) -> tuple[MPC, Rollout]:

@@ -16,14 +16,13 @@ from tests.native.exporting import (
     NATIVE,
     SANITIZED,
     STRICT,
-    U,
-    X,
     built,
     loop_of,
     needed,
     pushed,
     run,
 )
+from tests.native.pendulum import U, X
 
 
 @dataclass

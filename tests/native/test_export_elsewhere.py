@@ -9,16 +9,11 @@ import pytest
 
 from models import Disc, DistanceCost, PlanarArm, cart_pole_upright, redundancy_ocp
 from ocp import MPC, OCP, Box, Compiler, Constraint, Model, Parameter, Plant, PlantInput, Rate, Soft
-from ocp.internal import scaled
 from solvers import MultipleShooting, export_c
 from tests.native.exporting import (
     NATIVE,
-    PULL,
     SANITIZED,
     STRICT,
-    WIND,
-    U,
-    X,
     built,
     loop_of,
     needed,
@@ -26,23 +21,8 @@ from tests.native.exporting import (
     repeated,
     run,
 )
+from tests.native.pendulum import U, X, in_large_numbers
 from tests.native.problems import designed, free_time, swing
-
-
-def in_large_numbers() -> OCP:
-    """The pendulum in units in which its numbers are huge and tiny."""
-    large, small = 1e4, 1e-3
-    ocp = pushed(
-        model=Model(
-            name="far", x=X, u=U, f=ca.vertcat(X[1], large * U / small + PULL * X[0] + large * WIND)
-        ),
-        x0=[0.8 * large, 0.0],
-        running_cost=(X[0] / large) ** 2 + 0.1 * (X[1] / large) ** 2 + 0.05 * (U / small) ** 2,
-        control_bounds=Box(-2.5 * small, 2.5 * small),
-        state_bounds=Box([-2.0 * large, -0.9 * large], [2.0 * large, 2.0 * large]),
-    )
-    assert scaled(ocp) is not None
-    return ocp
 
 
 def changing_slowly() -> OCP:

@@ -23,8 +23,9 @@ from ocp import (
 from ocp.internal import scaled
 from solvers import Collocation, ManySolutions, MultipleShooting, solve_many
 from solvers.direct.multiple_shooting import MultipleShootingProgram
+from tests.native.pendulum import PULL, WIND, U, X, pushed
 from tests.native.problems import free_time, impossible, rationed
-from tests.native.test_warm_run import NATIVE, PULL, WIND, N, U, X, pushed
+from tests.native.test_warm_run import NATIVE, N
 
 K = 40
 # Both end where the optimality conditions leave 1e-9 or less.

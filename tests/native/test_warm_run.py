@@ -13,44 +13,24 @@ from ocp import (
     Constraint,
     Guess,
     Model,
-    Parameter,
     ProblemError,
     Program,
-    Signal,
     Solution,
     Status,
     solve,
 )
-from ocp.internal import ShiftedPlan, scaled
+from ocp.internal import ShiftedPlan
 from solvers import MultipleShooting
 from solvers.direct.multiple_shooting import MultipleShootingProgram
 from solvers.direct.native.native_solve import NativeSolve
 from solvers.direct.native.warm_run import WarmRun
+from tests.native.pendulum import LARGE, SMALL, X, in_large_numbers, pushed
 from tests.native.problems import rationed
 
 N = 12
 NATIVE = MultipleShooting(N, backend="native", judged=False)
 # Both end where the optimality conditions leave 1e-9 or less.
 SAME = 1e-7
-
-X, U, PULL, WIND = ca.SX.sym("x", 2), ca.SX.sym("u"), ca.SX.sym("pull"), ca.SX.sym("wind")
-
-
-def pushed(**changes) -> OCP:
-    """A pendulum in the wind, with bounds that matter, a parameter and a signal."""
-    given = {
-        "name": "pushed",
-        "model": Model(
-            name="pendulum", x=X, u=U, f=ca.vertcat(X[1], U + PULL * ca.sin(X[0]) + WIND)
-        ),
-        "x0": [0.8, 0.0],
-        "horizon": 1.5,
-        "running_cost": X[0] ** 2 + 0.1 * X[1] ** 2 + 0.05 * U**2,
-        "control_bounds": Box(-2.5, 2.5),
-        "state_bounds": Box([-2.0, -0.9], [2.0, 2.0]),
-        "parameters": (Parameter("pull", PULL, 1.2), Signal("wind", WIND, [0.1, -0.2, 0.3])),
-    }
-    return OCP(**(given | changes))
 
 
 @pytest.fixture(scope="module")
@@ -175,25 +155,14 @@ def test_a_warm_run_that_fails_is_not_made_twice(program, monkeypatch, solved) -
 
 @pytest.mark.slow
 def test_a_scaled_problem_starts_from_its_earlier_plan(monkeypatch, solved) -> None:
-    large, small = 1e4, 1e-3
-    ocp = pushed(
-        model=Model(
-            name="far", x=X, u=U, f=ca.vertcat(X[1], large * U / small + PULL * X[0] + large * WIND)
-        ),
-        x0=[0.8 * large, 0.0],
-        running_cost=(X[0] / large) ** 2 + 0.1 * (X[1] / large) ** 2 + 0.05 * (U / small) ** 2,
-        control_bounds=Box(-2.5 * small, 2.5 * small),
-        state_bounds=Box([-2.0 * large, -0.9 * large], [2.0 * large, 2.0 * large]),
-    )
-    assert scaled(ocp) is not None
-    program = NATIVE.build(ocp)
+    program = NATIVE.build(in_large_numbers())
     base = program.run().or_raise()
     before = len(solved)
     for guess in (base, ShiftedPlan(base, 0.05)):
-        given = {"x0": [0.7 * large, 0.0], "t0": 0.05, "guess": guess}
+        given = {"x0": [0.7 * LARGE, 0.0], "t0": 0.05, "guess": guess}
         quick, slow = program.run(**given).or_raise(), by_phases(program, monkeypatch, **given)
-        np.testing.assert_allclose(quick.x / large, slow.x / large, atol=SAME)
-        np.testing.assert_allclose(quick.u / small, slow.u / small, atol=SAME)
+        np.testing.assert_allclose(quick.x / LARGE, slow.x / LARGE, atol=SAME)
+        np.testing.assert_allclose(quick.u / SMALL, slow.u / SMALL, atol=SAME)
     assert len(solved) == before + 2  # those of the phases
     other = solve(cart_pole_upright(), replace(NATIVE, intervals=5))
     with pytest.raises(ProblemError, match="guess: the solution has 4 of x, 2 are needed"):
